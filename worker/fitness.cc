@@ -5,7 +5,6 @@
 
 #include "common/base/try.h"
 #include "common/score/density.h"
-#include "common/score/fitness.h"
 
 namespace gapfarm {
 namespace {
@@ -114,9 +113,7 @@ Result<FitnessReference> fitness_reference(const Problem& problem) {
       const CommandSpec c = resolved_command(problem.log.trials[i], problem.commands);
       if (same_command(c, motion.command)) reference.members.back().push_back(i);
     }
-    const auto named =
-        std::find_if(problem.commands.begin(), problem.commands.end(),
-                     [&](const CommandSpec& c) { return c.name == motion.command.name; });
+    const auto named = std::ranges::find(problem.commands, motion.command.name, &CommandSpec::name);
     reference.command.push_back(static_cast<std::size_t>(named - problem.commands.begin()));
   }
   if (reference.real.empty()) {

@@ -1,7 +1,6 @@
 // From a prediction to a fitness, for every kind that a config may choose.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "common/base/result.h"

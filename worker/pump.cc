@@ -1,7 +1,5 @@
 #include "worker/pump.h"
 
-#include "common/net/envelope.h"
-
 namespace gapfarm {
 
 bool pump_in(Transport& transport, WorkerSession& session, double now) {

@@ -9,14 +9,12 @@
 #include <cstdio>
 #include <list>
 #include <random>
-#include <string>
 #include <utility>
 
 #include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/net/master_wait.h"
 #include "common/net/socket.h"
-#include "common/process/process_pool.h"
 #include "worker/evaluate.h"
 #include "worker/pump.h"
 

@@ -23,8 +23,7 @@ class EvaluationThread {
   explicit EvaluationThread(WorkerProgress* progress = nullptr);
   // Waits for the job in hand.
   ~EvaluationThread();
-  EvaluationThread(const EvaluationThread&) = delete;
-  EvaluationThread& operator=(const EvaluationThread&) = delete;
+  EvaluationThread& operator=(EvaluationThread&&) = delete;
 
   void give(std::vector<Work> work);
   // Of `keys`, those that had not begun: they will not.

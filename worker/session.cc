@@ -111,8 +111,7 @@ void WorkerSession::ready(v1::Job* job, std::shared_ptr<const std::string> probl
 }
 
 std::shared_ptr<const std::string> WorkerSession::known_problem(const std::string& hash) {
-  const auto found = std::find_if(problems_.begin(), problems_.end(),
-                                  [&](const KnownProblem& known) { return known.hash == hash; });
+  const auto found = std::ranges::find(problems_, hash, &KnownProblem::hash);
   if (found == problems_.end()) return nullptr;
   problems_.splice(problems_.begin(), problems_, found);
   return found->bytes;
@@ -181,8 +180,7 @@ void WorkerSession::on_finished(v1::JobResult result) {
     return;
   }
   const AttemptKey key{result.epoch(), result.attempt_id()};
-  const auto former = std::find_if(former_.begin(), former_.end(),
-                                   [&](const Former& one) { return one.key == key; });
+  const auto former = std::ranges::find(former_, key, &Former::key);
   if (former == former_.end()) return;
   keep(former->question, &result);
   former_.erase(former);

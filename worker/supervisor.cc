@@ -9,7 +9,6 @@
 #include <cstdio>
 
 #include "common/base/try.h"
-#include "common/process/process_pool.h"
 
 namespace gapfarm {
 namespace {

@@ -16,8 +16,7 @@ class Hasher {
  public:
   Hasher();
   ~Hasher();
-  Hasher(const Hasher&) = delete;
-  Hasher& operator=(const Hasher&) = delete;
+  Hasher& operator=(Hasher&&) = delete;
 
   Hasher& add(std::string_view bytes);  // hashes the length too
   Hasher& add(double value);

@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "common/base/build_info.h"
-#include "common/base/suggest.h"
 #include "common/config/sections.h"
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"

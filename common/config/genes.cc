@@ -1,7 +1,9 @@
 // [genes]: which rows are searched, and where.
 #include <algorithm>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/config/sections.h"
 #include "common/trials/text/csv.h"
 
@@ -48,8 +50,7 @@ class GeneReader {
   }
 
   std::vector<std::string> known_names() const {
-    std::vector<std::string> known;
-    for (const Parameter& row : table_.rows()) known.push_back(row.key);
+    std::vector<std::string> known = mapped(table_.rows(), &Parameter::key);
     return known;
   }
 
@@ -68,8 +69,7 @@ class GeneReader {
                             "] with its parameters");
       return;
     }
-    std::vector<std::string> known;
-    for (const EffectParameter& parameter : effect.parameters) known.push_back(parameter.key);
+    std::vector<std::string> known = mapped(effect.parameters, &EffectParameter::key);
     for (const auto& [key, value] : *section) {
       const std::string word(key.str());
       const auto row = table_.find(effect.name + "." + word);
@@ -83,8 +83,7 @@ class GeneReader {
 
   void read_gene(std::size_t row, const toml::node& node) {
     const Parameter& parameter = table_[row];
-    const bool twice = std::any_of(genes_.begin(), genes_.end(),
-                                   [&](const Gene& gene) { return gene.row == row; });
+    const bool twice = contains(genes_, row, &Gene::row);
     if (twice) {
       errors_.add(node, "gene " + parameter.key + " is written twice; remove one");
       return;
@@ -150,10 +149,7 @@ class GeneReader {
     bool run = ends.size() >= 2;
     for (std::size_t i = 1; i < ends.size(); ++i) run = run && ends[i] == ends[i - 1] + 1;
     if (!run) {
-      std::string known;
-      for (const std::string& word : table_[gene.row].choices) {
-        known += (known.empty() ? "" : ", ") + word;
-      }
+      std::string known = joined(table_[gene.row].choices);
       errors_.add(range,
                   "gene " + table_[gene.row].key +
                       " needs two or more different choices that are neighbours in: " + known);

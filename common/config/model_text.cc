@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/text.h"
 #include "common/config/model.h"
 #include "common/config/residual_section.h"
 #include "common/config/sections.h"
@@ -29,8 +30,8 @@ std::string toml_count(std::uint64_t value) {
 std::string row_text(const Parameter& row, double value) {
   if (row.kind == ParameterKind::kReal) return toml_number(value);
   if (row.kind == ParameterKind::kBoolean) return value != 0 ? "true" : "false";
-  const auto index = static_cast<std::size_t>(value);
-  if (row.kind == ParameterKind::kChoice) return toml_string(row.choices[index]);
+  if (row.kind == ParameterKind::kChoice)
+    return toml_string(row.choices[static_cast<std::size_t>(value)]);
   return format_double(value);
 }
 
@@ -108,10 +109,7 @@ std::string directions(const FitnessSettings& fitness) {
 std::string program_section(const Model& model) {
   if (!model.external) return "";
   const ExternalCommand& command = model.external->command;
-  std::string argv;
-  for (const std::string& word : command.argv) {
-    argv += (argv.empty() ? "" : ", ") + toml_string(word);
-  }
+  std::string argv = joined(command.argv, ", ", toml_string);
   const std::string objective = directions(model.fitness) +
                                 (model.spread.kind == SpreadKind::kSampled ? "\nnoisy = true" : "");
   return "\n[" + model.scenario + "]\nprogram = [" + argv +
@@ -179,10 +177,7 @@ std::string frame_section(const Model& model) {
 }
 
 std::string origin_sections(const Model& model) {
-  std::string files;
-  for (const std::string& file : model.data.files) {
-    files += (files.empty() ? "" : ", ") + toml_string(file);
-  }
+  std::string files = joined(model.data.files, ", ", toml_string);
   return "\n[data]\nhash = " + toml_string(model.data.hash) +
          "\ntrials = " + std::to_string(model.data.trials) + "\nfiles = [" + files + "]\n" +
          "\n[program]\nversion = " + toml_string(model.version) +

@@ -29,14 +29,14 @@ std::optional<Eigen::MatrixXd> read_rows(TomlSection& section, const std::string
     section.fail(key, expected);
     return std::nullopt;
   }
-  Eigen::MatrixXd rows(static_cast<Eigen::Index>(list->size()), columns);
+  Eigen::MatrixXd rows(list->size(), columns);
   for (std::size_t k = 0; k < list->size(); ++k) {
     const toml::array* row = (*list)[k].as_array();
     bool sound = row != nullptr && static_cast<Eigen::Index>(row->size()) == columns;
     for (Eigen::Index j = 0; sound && j < columns; ++j) {
-      const auto value = (*row)[static_cast<std::size_t>(j)].value<double>();
+      const auto value = (*row)[j].value<double>();
       sound = value && std::isfinite(*value);
-      if (sound) rows(static_cast<Eigen::Index>(k), j) = *value;
+      if (sound) rows(k, j) = *value;
     }
     if (!sound) {
       section.errors().add((*list)[k], expected);
@@ -67,7 +67,7 @@ ResidualTerm read_term(TomlSection& section, const Model& model) {
   term.covariates = section.choices("covariates", names).value_or(std::vector<std::size_t>());
   term.lengths = section.numbers("lengths", 1e-9, 1e9).value_or(std::vector<double>());
   if (!term.covariates.empty()) {
-    auto rows = read_rows(section, "centres", static_cast<Eigen::Index>(term.covariates.size()));
+    auto rows = read_rows(section, "centres", term.covariates.size());
     if (rows) term.centres = std::move(*rows);
   }
   read_weights(section, model, &term);

@@ -1,5 +1,4 @@
 // [evolution], [farm] and [simulate]: how a run goes.
-#include <algorithm>
 
 #include "common/config/sections.h"
 #include "common/trials/text/csv.h"

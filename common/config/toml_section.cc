@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/trials/text/csv.h"
 
@@ -14,8 +15,7 @@ void TomlErrors::add(const toml::source_position& place, const std::string& sent
 
 Error TomlErrors::error() const {
   std::vector<Found> sorted = found_;
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const Found& a, const Found& b) { return a.place < b.place; });
+  std::ranges::stable_sort(sorted, {}, &Found::place);
   std::string text;
   for (const Found& found : sorted) {
     text += (text.empty() ? "" : "\n") + file_ + ":" + std::to_string(found.place.line) + ":" +
@@ -193,7 +193,7 @@ std::optional<std::vector<std::size_t>> TomlSection::choices(std::string_view ke
   for (const toml::node* element : elements(*node)) {
     const auto value = choice_of(key, *element, names);
     if (!value) return {};
-    if (std::find(all.begin(), all.end(), *value) != all.end()) {
+    if (contains(all, *value)) {
       errors_->add(*element, std::string(key) + " names " + quoted_word(names[*value]) + " twice");
       return {};
     }
@@ -262,10 +262,9 @@ void TomlSection::fail(std::string_view key, const std::string& sentence) {
 void TomlSection::finish(const toml::table& table, const std::string& prefix) {
   for (const auto& [key, node] : table) {
     const std::string word = prefix + std::string(key.str());
-    if (std::find(known_.begin(), known_.end(), word) != known_.end()) continue;
-    const bool begun = std::any_of(known_.begin(), known_.end(), [&](const std::string& known) {
-      return known.rfind(word + ".", 0) == 0;
-    });
+    if (contains(known_, word)) continue;
+    const bool begun = std::ranges::any_of(
+        known_, [&](const std::string& known) { return known.rfind(word + ".", 0) == 0; });
     if (begun && node.is_table()) {
       finish(*node.as_table(), word + ".");
       continue;

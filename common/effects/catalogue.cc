@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <numbers>
-#include <string>
 #include <utility>
-#include <vector>
 
 namespace gapfarm {
 namespace {
@@ -145,8 +143,7 @@ std::vector<Effect> build_youngest() {
 // Of an effect of which there may be two.
 Effect second_one(const std::string& first) {
   const std::vector<Effect> catalogue = build_catalogue();
-  Effect second = *std::find_if(catalogue.begin(), catalogue.end(),
-                                [&](const Effect& effect) { return effect.name == first; });
+  Effect second = *std::ranges::find(catalogue, first, &Effect::name);
   second.repeats = first;
   second.name += "_2";
   second.summary += "; a second one";

@@ -1,14 +1,12 @@
 // Lines of JSON from a program of the user's.  Internal to common/external.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 
 namespace gapfarm::line_json {
-
-using Json = nlohmann::ordered_json;
 
 // `what`, and the beginning of the line.
 Error wrong(const std::string& what, const std::string& line);

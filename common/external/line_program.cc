@@ -11,8 +11,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <utility>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/process/child.h"
 
@@ -37,11 +37,7 @@ std::string shell_quoted(const std::string& word) {
   return text + "'";
 }
 
-std::string in_seconds(double seconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g s", seconds);
-  return text;
-}
+std::string in_seconds(double seconds) { return formatted("%g s", seconds); }
 
 void close_fd(int* fd) {
   if (*fd >= 0) close(*fd);
@@ -56,11 +52,7 @@ LineProgram::LineProgram(std::vector<std::string> argv, std::string folder, Line
 
 LineProgram::~LineProgram() { kill(); }
 
-std::string LineProgram::name() const {
-  std::string text;
-  for (const std::string& word : argv_) text += (text.empty() ? "" : " ") + word;
-  return text;
-}
+std::string LineProgram::name() const { return joined(argv_, " "); }
 
 std::string LineProgram::by_hand(const std::vector<std::string>& lines) const {
   std::string text = "cd " + shell_quoted(folder_.empty() ? "." : folder_) + " && printf '%s\\n'";

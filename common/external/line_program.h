@@ -28,8 +28,7 @@ class LineProgram {
   // `words`: program and arguments, found by PATH, started in `folder`.
   LineProgram(std::vector<std::string> argv, std::string folder, LineLimits limits, Clock clock);
   ~LineProgram();
-  LineProgram(const LineProgram&) = delete;
-  LineProgram& operator=(const LineProgram&) = delete;
+  LineProgram& operator=(LineProgram&&) = delete;
 
   // The line that answers `line`, both without their end.  Errors name the program and what it did:
   // it cannot be started, has ended (with what status or signal), does not answer in time, says

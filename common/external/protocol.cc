@@ -5,6 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "common/external/line_json.h"
@@ -12,8 +13,6 @@
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 using line_json::read_object;
 using line_json::word_of;
@@ -28,7 +27,7 @@ double number_of(const Json& json, const char* key, double fallback) {
 Result<unsigned> read_inputs(const Json& json) {
   unsigned inputs = 0;
   std::vector<std::string> known;
-  for (const ExternalInputWord& row : kExternalInputNames) known.emplace_back(row.word);
+  for (const ExternalInputWord& word : kExternalInputNames) known.emplace_back(word.word);
   for (const Json& word : json.value("inputs", Json::array())) {
     const std::string text = word.is_string() ? word.get<std::string>() : json_text(word);
     const auto row = std::find_if(std::begin(kExternalInputNames), std::end(kExternalInputNames),
@@ -47,7 +46,7 @@ Status check_keys(const Json& json, const std::string& parameter) {
   static const std::vector<std::string> kKeys = {"key", "unit",    "lower",   "upper", "nominal",
                                                  "log", "integer", "choices", "when",  "summary"};
   for (const auto& [key, value] : json.items()) {
-    if (std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end()) continue;
+    if (contains(kKeys, key)) continue;
     return Error{"declares parameter '" + parameter + "' with the unknown key '" + key + "'" +
                  suggestion(key, kKeys) +
                  "; known: key, unit, lower, upper, nominal, log, integer, choices, when, summary"};
@@ -92,8 +91,7 @@ Result<std::vector<ExternalCondition>> read_conditions(const Json& json,
     const auto wrong = [&](const std::string& what) {
       return Error{"parameter '" + word_of(json, "key") + "' depends on '" + key + "', " + what};
     };
-    const auto on = std::find_if(before.begin(), before.end(),
-                                 [&](const Parameter& p) { return p.key == key; });
+    const auto on = std::ranges::find(before, key, &Parameter::key);
     if (on == before.end()) return wrong("which is not declared before it");
     if (on->kind == ParameterKind::kReal) return wrong("which is neither choices nor an integer");
     ExternalCondition& one = conditions.emplace_back();

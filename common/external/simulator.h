@@ -4,7 +4,6 @@
 #include <functional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "common/base/result.h"
 #include "common/external/line_program.h"

@@ -1,7 +1,6 @@
 // JSON objects field by field.  A row is described once, as a function of a visitor and the row:
 //
-//   constexpr auto kCheck = [](auto& v, auto& row) { v.field("p", row.p); v.later("note",
-//   row.note); };
+//   constexpr auto kCheck = [](auto& v, auto& row) { FIELDS(p, excess); LATER(note); };
 //
 // FieldWriter writes it, LenientFields reads it back.
 #pragma once
@@ -13,16 +12,24 @@
 #include <utility>
 #include <vector>
 
+#include "common/json/json.h"
+
+// Members of `row` under their own names, one after another, for the visitor `v`.
+#define FIELD_(name) v.field(#name, row.name);
+#define LATER_(name) v.later(#name, row.name);
+#define IF_ANY_(name) v.if_any(#name, row.name);
+#define FIELDS(...) NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(FIELD_, __VA_ARGS__))
+#define LATER(...) NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(LATER_, __VA_ARGS__))
+#define IF_ANY(...) NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(IF_ANY_, __VA_ARGS__))
+
 namespace gapfarm {
 
-inline nlohmann::ordered_json number_or_null(const std::optional<double>& value) {
-  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+inline Json number_or_null(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
 }
 
 class FieldWriter {
  public:
-  using Json = nlohmann::ordered_json;
-
   template <class T>
   void field(const char* key, const T& value) {
     json_[key] = value;
@@ -86,7 +93,6 @@ class FieldWriter {
 // is by default, and list items that are no objects are skipped.
 class LenientFields {
  public:
-  using Json = nlohmann::ordered_json;
   explicit LenientFields(const Json& json) : json_(json) {}
 
   template <class T>

@@ -12,13 +12,9 @@ std::string text_of(const Json& json, int indent) {
 
 }  // namespace
 
-nlohmann::ordered_json parse_json(std::string_view text) {
-  return nlohmann::ordered_json::parse(text, nullptr, false);
-}
+Json parse_json(std::string_view text) { return Json::parse(text, nullptr, false); }
 
-std::string json_text(const nlohmann::ordered_json& json, int indent) {
-  return text_of(json, indent);
-}
+std::string json_text(const Json& json, int indent) { return text_of(json, indent); }
 
 std::string json_text(const nlohmann::json& json, int indent) { return text_of(json, indent); }
 

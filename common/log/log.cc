@@ -99,8 +99,7 @@ bool Log::wants(LogLevel level) const { return impl_->logger.should_log(spdlog_l
 
 void Log::set(LogField field) {
   const std::lock_guard lock(impl_->mutex);
-  const auto same = std::find_if(impl_->context.begin(), impl_->context.end(),
-                                 [&](const LogField& f) { return f.key == field.key; });
+  const auto same = std::ranges::find(impl_->context, field.key, &LogField::key);
   if (same == impl_->context.end()) {
     impl_->context.push_back(std::move(field));
   } else {

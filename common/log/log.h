@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <initializer_list>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -40,8 +39,7 @@ class Log {
   // A file that cannot be opened: nothing is written; trouble() says why.
   explicit Log(const LogOptions& options);
   ~Log();
-  Log(const Log&) = delete;
-  Log& operator=(const Log&) = delete;
+  Log& operator=(Log&&) = delete;
 
   bool wants(LogLevel level) const;
   // One line.  Text and values may hold anything.

@@ -88,9 +88,8 @@ std::vector<std::size_t> front_numbers(
 std::vector<std::size_t> first_front(std::span<const Costs> points) {
   std::vector<std::size_t> front;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const bool beaten = std::any_of(points.begin(), points.end(), [&](const Costs& other) {
-      return dominates(other, points[i]);
-    });
+    const bool beaten = std::ranges::any_of(
+        points, [&](const Costs& other) { return dominates(other, points[i]); });
     if (!beaten) front.push_back(i);
   }
   return front;

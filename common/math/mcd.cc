@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "common/base/ranges.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 
@@ -117,8 +118,7 @@ class Concentration {
       Fit fit = random_start(stream);
       for (int k = 0; k < 2 && !fit.singular(); ++k) fit = step(fit);
       if (fit.singular()) return fit;
-      const bool known = std::any_of(best.begin(), best.end(),
-                                     [&](const Fit& b) { return b.subset == fit.subset; });
+      const bool known = contains(best, fit.subset, &Fit::subset);
       if (known) continue;
       best.insert(std::upper_bound(best.begin(), best.end(), fit, better), fit);
       if (best.size() > std::max(1U, settings.finalists)) best.pop_back();
@@ -299,9 +299,7 @@ RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settin
 }
 
 CentredPoses centre_headings(std::span<const Pose> poses) {
-  std::vector<double> headings;
-  headings.reserve(poses.size());
-  for (const Pose& pose : poses) headings.push_back(pose.theta);
+  std::vector<double> headings = mapped(poses, [](const Pose& pose) { return pose.theta; });
   CentredPoses result;
   result.reference_rad = circular_centre(headings);
   result.vectors.resize(3, static_cast<Index>(poses.size()));

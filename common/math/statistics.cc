@@ -66,8 +66,7 @@ double circular_centre(std::span<const double> angles_rad) {
 MeanCovariance weighted_mean_covariance(const Eigen::MatrixXd& points,
                                         std::span<const double> weights) {
   assert(static_cast<std::size_t>(points.cols()) == weights.size());
-  const Eigen::Map<const Eigen::VectorXd> w(weights.data(),
-                                            static_cast<Eigen::Index>(weights.size()));
+  const Eigen::Map<const Eigen::VectorXd> w(weights.data(), weights.size());
   const double v1 = w.sum();
   const double v2 = w.squaredNorm();
   assert(v1 > 0);

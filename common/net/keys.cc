@@ -15,10 +15,8 @@
 #include <filesystem>
 #include <map>
 #include <sstream>
-#include <string>
 #include <zmq.hpp>
 
-#include "common/base/result.h"
 #include "common/base/try.h"
 
 namespace gapfarm {
@@ -194,9 +192,8 @@ bool is_key_name(std::string_view name) {
   if (name.empty() || name.size() > 64 || !std::isalnum(static_cast<unsigned char>(name[0]))) {
     return false;
   }
-  return std::all_of(name.begin(), name.end(), [](unsigned char c) {
-    return std::isalnum(c) || c == '.' || c == '_' || c == '-';
-  });
+  return std::ranges::all_of(
+      name, [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; });
 }
 
 Result<std::vector<PublicKey>> read_listed_keys(const std::string& folder,
@@ -216,8 +213,7 @@ Result<std::vector<PublicKey>> read_listed_keys(const std::string& folder,
     }
   }
   if (error) return Error{"cannot read the key folder '" + folder + "': " + error.message()};
-  std::sort(keys.begin(), keys.end(),
-            [](const PublicKey& a, const PublicKey& b) { return a.name < b.name; });
+  std::ranges::sort(keys, {}, &PublicKey::name);
   return keys;
 }
 

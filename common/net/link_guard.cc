@@ -207,7 +207,7 @@ class LinkGuard::Watch {
       drop(fd, link);
       return;
     }
-    shared_.strange[static_cast<std::size_t>(fd)] = true;
+    shared_.strange[fd] = true;
     strangers_.push_back(fd);
     // Whichever falls, an honest peer comes again, and none of them can be distinguished from the
     // others.
@@ -215,8 +215,7 @@ class LinkGuard::Watch {
   }
 
   void mind_strangers() {
-    std::erase_if(strangers_,
-                  [&](int fd) { return !shared_.strange[static_cast<std::size_t>(fd)]; });
+    std::erase_if(strangers_, [&](int fd) { return !shared_.strange[fd]; });
     const double now = seconds();
     if (!strangers_.empty() && now >= next_weighing_) {
       next_weighing_ = now + 1e-3 * kStrangersInterval_ms;
@@ -251,7 +250,7 @@ class LinkGuard::Watch {
 
   void forget_stranger(int fd) {
     if (static_cast<std::size_t>(fd) < kDescriptors) {
-      shared_.strange[static_cast<std::size_t>(fd)] = false;
+      shared_.strange[fd] = false;
     }
     std::erase(strangers_, fd);
   }
@@ -309,7 +308,7 @@ void LinkGuard::heard(const zmq::message_t& message) {
   if (shared_->strangers.load(std::memory_order_relaxed) == 0) return;
   const int fd = zmq_msg_get(const_cast<zmq_msg_t*>(message.handle()), ZMQ_SRCFD);
   if (fd < 0 || static_cast<std::size_t>(fd) >= kDescriptors) return;
-  shared_->strange[static_cast<std::size_t>(fd)].store(false, std::memory_order_relaxed);
+  shared_->strange[fd].store(false, std::memory_order_relaxed);
 }
 
 LinkCounts LinkGuard::counts() const {

@@ -5,11 +5,7 @@
 // the handshake a connection is a stranger; strangers are few, send little, and give way.
 #pragma once
 
-#include <atomic>
-#include <cstddef>
-#include <cstdint>
 #include <memory>
-#include <set>
 #include <string>
 #include <thread>
 #include <unordered_map>
@@ -44,8 +40,7 @@ class LinkGuard {
   LinkGuard(zmq::context_t& context, zmq::socket_t& router, const LinkSecurity& security,
             const LinkLimits& limits);
   ~LinkGuard();
-  LinkGuard(const LinkGuard&) = delete;
-  LinkGuard& operator=(const LinkGuard&) = delete;
+  LinkGuard& operator=(LinkGuard&&) = delete;
 
   // From the socket's thread: a message came in over this connection.
   void heard(const zmq::message_t& message);

@@ -8,12 +8,10 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <string>
 #include <utility>
 #include <zmq.hpp>
 
 #include "common/base/try.h"
-#include "common/net/envelope.h"
 #include "common/net/link_guard.h"
 
 namespace gapfarm {
@@ -25,8 +23,7 @@ class HandshakeWatch {
   HandshakeWatch(zmq::context_t& context, zmq::socket_t& socket, std::string endpoint,
                  double retry_s);
   ~HandshakeWatch();
-  HandshakeWatch(const HandshakeWatch&) = delete;
-  HandshakeWatch& operator=(const HandshakeWatch&) = delete;
+  HandshakeWatch& operator=(HandshakeWatch&&) = delete;
 
   // Handles what has happened.  After an answer that is no proper ZMTP, or another mechanism,
   // ZeroMQ gives an endpoint up for good; here it is connected to again, `retry_s` later.

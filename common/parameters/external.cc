@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/parameters/ground.h"
 
 namespace gapfarm {
@@ -116,16 +117,14 @@ bool is_taken(const std::string& key, bool runs) {
     if (row.key == key) return true;
   }
   const std::span<const Effect> known = srv1_effects_and_seconds();
-  return std::any_of(known.begin(), known.end(),
-                     [&](const Effect& effect) { return effect.name == key; });
+  return contains(known, key, &Effect::name);
 }
 
 template <class Wrong>
 Status check_choices(const std::vector<std::string>& choices, const Wrong& wrong) {
   for (const std::string& word : choices) {
-    const bool plain = std::none_of(word.begin(), word.end(), [](char c) {
-      return static_cast<unsigned char>(c) < ' ' || c == 127;
-    });
+    const bool plain = std::ranges::none_of(
+        word, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; });
     if (word.empty() || !plain) return wrong("has a choice that is empty or no plain text");
     if (std::count(choices.begin(), choices.end(), word) > 1) {
       return wrong("has the choice '" + word + "' twice");
@@ -186,9 +185,8 @@ Status check_declaration(const ExternalDeclaration& declaration) {
 std::vector<bool> ExternalDeclaration::present(const ParameterValues& values) const {
   std::vector<bool> there(parameters.size(), true);
   for (std::size_t i = 0; i < when.size(); ++i) {
-    there[i] = std::all_of(when[i].begin(), when[i].end(), [&](const ExternalCondition& c) {
-      return there[c.row] &&
-             std::find(c.values.begin(), c.values.end(), values[c.row]) != c.values.end();
+    there[i] = std::ranges::all_of(when[i], [&](const ExternalCondition& c) {
+      return there[c.row] && contains(c.values, values[c.row]);
     });
   }
   return there;

@@ -67,8 +67,7 @@ class ExternalTable {
  public:
   // REQUIRES: check_declaration() is OK.
   explicit ExternalTable(ExternalDeclaration declaration);
-  ExternalTable(const ExternalTable&) = delete;
-  ExternalTable& operator=(const ExternalTable&) = delete;
+  ExternalTable& operator=(ExternalTable&&) = delete;
 
   const ExternalDeclaration& declaration() const { return declaration_; }
   const ParameterTable& table() const { return *table_; }

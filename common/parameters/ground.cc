@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/base/constants.h"
+#include "common/base/ranges.h"
 
 namespace gapfarm {
 namespace {
@@ -80,10 +81,7 @@ class Rows {
       }
     };
   }
-  bool has(WheelKind kind) const {
-    return std::any_of(robot_.wheels.begin(), robot_.wheels.end(),
-                       [&](const RobotWheel& w) { return w.kind == kind; });
-  }
+  bool has(WheelKind kind) const { return contains(robot_.wheels, kind, &RobotWheel::kind); }
   double extent(std::optional<double> RobotWheel::*at) const {
     double least = 0, most = 0;
     for (const RobotWheel& w : robot_.wheels) {

@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/constants.h"
 #include "common/parameters/table.h"
 
 namespace gapfarm::rows {

@@ -4,7 +4,6 @@
 #include <cassert>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 
 #include "common/parameters/external.h"
 #include "common/parameters/ground.h"

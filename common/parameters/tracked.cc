@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 
+#include "common/base/text.h"
 #include "common/parameters/rows.h"
 #include "common/parameters/srv1_robot_file.h"
 #include "common/robot/robot_file.h"
@@ -58,11 +58,7 @@ const TreadNumbers& srv1_numbers() {
 }
 
 // Bounds are no measurements: three digits do.
-double three_digits(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return std::strtod(text, nullptr);
-}
+double three_digits(double value) { return std::strtod(formatted("%.3g", value).c_str(), nullptr); }
 
 Parameter scaled(double factor, Parameter row) {
   row.lower = three_digits(row.lower * factor);

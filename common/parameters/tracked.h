@@ -20,8 +20,7 @@ class TrackedTable {
  public:
   // REQUIRES: check_tracked() is OK.
   explicit TrackedTable(const GroundRobot& robot);
-  TrackedTable(const TrackedTable&) = delete;
-  TrackedTable& operator=(const TrackedTable&) = delete;
+  TrackedTable& operator=(TrackedTable&&) = delete;
 
   const ParameterTable& table() const { return *table_; }
   // The nominal ones, and what the file says that is an effect here: lag, dead band, rolling

@@ -1,6 +1,5 @@
 #include "common/problem/fitness_problem.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/base/try.h"

@@ -1,7 +1,6 @@
 #include "common/problem/problem.h"
 
 #include <cassert>
-#include <string>
 
 #include "common/base/try.h"
 #include "common/robot/robot_file.h"

@@ -18,6 +18,10 @@
 #include "common/trials/trial.h"
 #include "gapfarm/v1/problem.pb.h"
 
+namespace gapfarm::v1 {
+class Override;
+}
+
 namespace gapfarm {
 
 // An atomic command: what the motors are commanded when a trial does not say otherwise.
@@ -152,6 +156,11 @@ std::vector<CommandSpec> default_commands(std::string_view scenario);
 v1::Problem to_proto(const Problem& problem);
 // Checks scenario, sizes, bounds, commands and finiteness; the error names the field.
 Result<Problem> from_proto(const v1::Problem& message);
+
+// A value in place of the problem's; all of `values` that are not the problem's.
+v1::Override override_of(std::size_t row, double value);
+std::vector<v1::Override> overrides_of(const ParameterValues& problem,
+                                       const ParameterValues& values);
 
 v1::Pose to_proto(const Pose& pose);
 Pose from_proto(const v1::Pose& pose);

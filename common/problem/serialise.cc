@@ -12,6 +12,7 @@
 #include "common/problem/external_problem.h"
 #include "common/problem/fitness_problem.h"
 #include "common/problem/residual_problem.h"
+#include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
 namespace {
@@ -275,6 +276,22 @@ Trial from_proto(const v1::Trial& message) {
   }
   if (message.has_run()) trial.run = message.run();
   return trial;
+}
+
+v1::Override override_of(std::size_t row, double value) {
+  v1::Override override;
+  override.set_parameter(static_cast<std::uint32_t>(row));
+  override.set_value(value);
+  return override;
+}
+
+std::vector<v1::Override> overrides_of(const ParameterValues& problem,
+                                       const ParameterValues& values) {
+  std::vector<v1::Override> overrides;
+  for (std::size_t row = 0; row < values.size(); ++row) {
+    if (values[row] != problem[row]) overrides.push_back(override_of(row, values[row]));
+  }
+  return overrides;
 }
 
 v1::Problem to_proto(const Problem& problem) {

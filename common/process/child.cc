@@ -72,8 +72,7 @@ class MemoryFile {
   ~MemoryFile() {
     if (fd_ >= 0) close(fd_);
   }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
+  MemoryFile& operator=(MemoryFile&&) = delete;
 
   int fd() const { return fd_; }
   bool fill(const std::string& text) {

@@ -16,8 +16,6 @@
 #include <cerrno>
 #include <cmath>
 #include <limits>
-#include <new>
-#include <string>
 #include <utility>
 
 #include "common/process/child.h"

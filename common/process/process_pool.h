@@ -125,8 +125,7 @@ class ProcessPool {
   explicit ProcessPool(ProcessPoolOptions options);
   // Kills what is left.
   ~ProcessPool();
-  ProcessPool(const ProcessPool&) = delete;
-  ProcessPool& operator=(const ProcessPool&) = delete;
+  ProcessPool& operator=(ProcessPool&&) = delete;
 
   Status start(double now);
   // Kills the children that exceed a limit, collects those that ended and starts those that are

@@ -10,8 +10,7 @@ class StopSource {
  public:
   StopSource();
   ~StopSource();
-  StopSource(const StopSource&) = delete;
-  StopSource& operator=(const StopSource&) = delete;
+  StopSource& operator=(StopSource&&) = delete;
 
   // Async-signal-safe and thread-safe.  `signal` is kept for the exit status; 0: no signal.
   void request(int signal = 0);
@@ -38,8 +37,7 @@ class StopOnSignals {
  public:
   explicit StopOnSignals(StopSource* stop, bool ignore_interrupt = false);
   ~StopOnSignals();
-  StopOnSignals(const StopOnSignals&) = delete;
-  StopOnSignals& operator=(const StopOnSignals&) = delete;
+  StopOnSignals& operator=(StopOnSignals&&) = delete;
 
  private:
   struct Saved;

@@ -1,8 +1,6 @@
 #include "common/progress/overall_progress.h"
 
 #include <algorithm>
-#include <cstdio>
-#include <utility>
 
 #include "common/progress/number_text.h"
 

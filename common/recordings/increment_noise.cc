@@ -1,6 +1,5 @@
 #include "common/recordings/increment_noise.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -28,8 +27,7 @@ Eigen::Matrix3d turn(double theta) {
 Eigen::Matrix3d noise_of(std::span<const double> columns) {
   Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
   if (columns.size() == 3) {
-    for (Eigen::Index k = 0; k < 3; ++k)
-      C(k, k) = std::pow(columns[static_cast<std::size_t>(k)], 2);
+    for (Eigen::Index k = 0; k < 3; ++k) C(k, k) = std::pow(columns[k], 2);
     return C;
   }
   std::size_t at = 0;

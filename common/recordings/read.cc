@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "common/base/ranges.h"
+#include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
@@ -24,25 +26,23 @@ class RunTable {
  public:
   static Result<RunTable> read(const std::string& path, std::span<const std::string> names,
                                const char* format, RowCheck check = nullptr) {
-    const auto text = read_text_file(path);
-    if (!text) return text.error();
-    auto rows = parse_csv(*text, path);
+    ASSIGN_OR_RETURN(const auto text, read_text_file(path));
+    auto rows = parse_csv(text, path);
     if (!rows) return rows.error();
     if (rows->empty()) return text_error(path, {}, "an empty file", format);
     RunTable table;
     table.check_ = check;
     table.names_ = {"run", "t"};
     table.names_.insert(table.names_.end(), names.begin(), names.end());
-    auto header = CsvHeader::match(rows->front(), table.names_, path, format);
-    if (!header) return header.error();
+    ASSIGN_OR_RETURN(auto header, CsvHeader::match(rows->front(), table.names_, path, format));
     std::optional<std::size_t> session;
-    for (const std::size_t column : header->extra()) {
+    for (const std::size_t column : header.extra()) {
       if (rows->front().fields[column].text == "session") session = column;
     }
     for (std::size_t i = 1; i < rows->size(); ++i) {
       const CsvRow& row = (*rows)[i];
-      if (Status s = check_width(row, *header, path); !s) return s.error();
-      if (Status s = table.take(row, *header, session, path); !s) return s.error();
+      if (Status s = check_width(row, header, path); !s) return s.error();
+      if (Status s = table.take(row, header, session, path); !s) return s.error();
     }
     if (table.rows_.empty()) return text_error(path, {2, 1}, "no rows", format);
     return table;
@@ -98,9 +98,7 @@ Result<std::vector<std::string>> header_of(const std::string& path) {
 
 // The columns of poses: of increments with those of their noise, where the header has some.
 std::vector<std::string> pose_columns(std::span<const std::string> header) {
-  const auto has = [&](const std::string& name) {
-    return std::find(header.begin(), header.end(), name) != header.end();
-  };
+  const auto has = [&](const std::string& name) { return contains(header, name); };
   if (!has("dx")) return {"x", "y", "theta"};
   std::vector<std::string> names = {"dx", "dy", "dtheta"};
   for (const auto* noise : {&kCovarianceColumns, &kDeviationColumns}) {
@@ -161,35 +159,33 @@ std::string name_of(const RunKey& key) {
 
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels) {
-  const auto commands = RunTable::read(commands_path, channels, "a command log");
-  if (!commands) return commands.error();
+  ASSIGN_OR_RETURN(const auto commands, RunTable::read(commands_path, channels, "a command log"));
   const auto header = header_of(poses_path);
   if (!header) return header.error();
   const std::vector<std::string> columns = pose_columns(*header);
   RunLog log;
   log.relative = columns.front() == "dx";
-  const auto poses = RunTable::read(poses_path, columns, "a pose log",
-                                    log.relative ? fault_of_increment : nullptr);
-  if (!poses) return poses.error();
+  ASSIGN_OR_RETURN(const auto poses, RunTable::read(poses_path, columns, "a pose log",
+                                                    log.relative ? fault_of_increment : nullptr));
   log.channels.assign(channels.begin(), channels.end());
-  for (const RunKey& key : poses->order()) {
-    if (!commands->has(key)) {
+  for (const RunKey& key : poses.order()) {
+    if (!commands.has(key)) {
       return Error{poses_path + ": run " + quoted_word(name_of(key)) + " has no commands in " +
                    commands_path};
     }
     LoggedRun run;
     run.session = key.first;
     run.run = key.second;
-    run.commands = commands->of(key);
-    const std::size_t repeated = add_poses(poses->of(key), log.relative, &run);
+    run.commands = commands.of(key);
+    const std::size_t repeated = add_poses(poses.of(key), log.relative, &run);
     if (repeated > 0 && !log.relative) {
       log.notes.push_back(poses_path + ": run " + quoted_word(name_of(key)) + ": " +
                           std::to_string(repeated) + " poses at the time of the one before");
     }
     log.runs.push_back(std::move(run));
   }
-  for (const RunKey& key : commands->order()) {
-    if (!poses->has(key)) {
+  for (const RunKey& key : commands.order()) {
+    if (!poses.has(key)) {
       log.notes.push_back(commands_path + ": run " + quoted_word(name_of(key)) +
                           " has no poses and is omitted");
     }
@@ -202,11 +198,10 @@ namespace {
 // Rows of a file beside the log's, for the runs that it names.
 Status read_beside(const std::string& path, std::span<const std::string> names, const char* format,
                    RowCheck check, std::vector<CommandRow> LoggedRun::*rows, RunLog* log) {
-  const auto table = RunTable::read(path, names, format, check);
-  if (!table) return table.error();
+  ASSIGN_OR_RETURN(const auto table, RunTable::read(path, names, format, check));
   for (LoggedRun& run : log->runs) {
     const RunKey key{run.session, run.run};
-    if (table->has(key)) run.*rows = table->of(key);
+    if (table.has(key)) run.*rows = table.of(key);
   }
   return {};
 }

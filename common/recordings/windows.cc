@@ -1,7 +1,6 @@
 #include "common/recordings/windows.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace gapfarm {
 namespace {
@@ -29,9 +28,8 @@ CommandedRun commanded(const LoggedRun& run) {
   CommandedRun to;
   to.commands = run.commands;
   to.start_s = run.poses.front().t_s;
-  const auto later = std::find_if(run.poses.begin(), run.poses.end(), [&](const PoseRow& p) {
-    return p.t_s >= to.start_s + kSpeedSpan_s;
-  });
+  const auto later = std::ranges::find_if(
+      run.poses, [&](const PoseRow& p) { return p.t_s >= to.start_s + kSpeedSpan_s; });
   if (stands(run.commands.front()) || later == run.poses.end()) return to;
   const double dt = later->t_s - to.start_s;
   if (dt > 2 * kSpeedSpan_s) return to;

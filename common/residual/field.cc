@@ -41,7 +41,7 @@ Eigen::VectorXd bumps(const ResidualTerm& term, const LoggedMotion& facts, const
     const ResidualCovariate& covariate = kCovariates[term.covariates[j]];
     const double value = covariate.value(facts, X_WR);
     for (Eigen::Index k = 0; k < squares.size(); ++k) {
-      const double away = value - term.centres(k, static_cast<Eigen::Index>(j));
+      const double away = value - term.centres(k, j);
       const double d = (covariate.cyclic ? 2 * std::sin(away / 2) : away) / term.lengths[j];
       squares[k] += d * d;
     }

@@ -1,9 +1,9 @@
 // What follows from a robot's drive and the sizes that its file states.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
+#include "common/base/text.h"
 #include "common/robot/robot.h"
 
 namespace gapfarm {
@@ -18,11 +18,7 @@ constexpr double kHeightPerGauge = 0.2;  // centre of mass over the floor
 constexpr double kMass_kg = 10;          // hardly matters to Coulomb friction
 constexpr double kTrackPerBase = 0.6;    // of a car
 
-std::string digits4(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
+std::string digits4(double value) { return formatted("%.4g", value); }
 
 class Completion {
  public:

@@ -5,14 +5,12 @@
 #include <cstdio>
 #include <utility>
 
+#include "common/base/text.h"
+
 namespace gapfarm {
 namespace {
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
+std::string number(double value) { return formatted("%.4g", value); }
 
 Status check_channels(const GroundRobot& robot) {
   const auto& c = robot.channels;

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <numbers>
 #include <tuple>
 
+#include "common/base/text.h"
+#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/score/density.h"
 #include "common/score/motion_model.h"
@@ -171,11 +172,7 @@ class MinedMotion {
   double scale_ = 1;
 };
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3f", value);
-  return text;
-}
+std::string number(double value) { return formatted("%.3f", value); }
 
 }  // namespace
 
@@ -184,15 +181,13 @@ Result<std::vector<BaselineScores>> baseline_scores(const TrialLog& train, const
   MotionModelSettings settings;
   settings.least_trials = kLeastBaselineTrials;
   settings.mcd.starts = kMcdStarts;
-  const auto mined = MotionModel::mine(train, commands, settings);
-  if (!mined) return mined.error();
+  ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(train, commands, settings));
   MotionModelSettings names;  // no command has trials enough to be fitted
   names.least_trials = test.trials.size() + 1;
-  const auto check = MotionModel::mine(test, commands, names);
-  if (!check) return check.error();
+  ASSIGN_OR_RETURN(const auto check, MotionModel::mine(test, commands, names));
   // Ends about each command's robust mean, in the start's axes.
   std::map<CommandKey, Pose> about;
-  for (const CommandMotion& motion : mined->commands()) {
+  for (const CommandMotion& motion : mined.commands()) {
     if (motion.trials >= kLeastBaselineTrials)
       about[command_key(motion.command)] = motion.motion.mean;
   }
@@ -217,7 +212,7 @@ Result<std::vector<BaselineScores>> baseline_scores(const TrialLog& train, const
   std::optional<MinedMotion> motion;
   if (!ends.empty()) {
     constant.emplace(ends);
-    motion.emplace(*mined, ends);
+    motion.emplace(mined, ends);
   }
   for (const Trial& trial : test.trials) {
     const auto [key, offset] = seen(trial);

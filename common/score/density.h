@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <span>
 #include <type_traits>
-#include <vector>
 
 #include "common/base/result.h"
 

@@ -1,11 +1,9 @@
 #include "common/score/kinematic.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <optional>
-#include <span>
 
 #include "common/base/constants.h"
 #include "common/robot/robot_drive.h"

@@ -8,7 +8,6 @@
 #include <string>
 
 #include "common/math/algebra.h"
-#include "common/score/kinematic.h"
 
 namespace gapfarm {
 namespace {
@@ -37,8 +36,7 @@ std::optional<double> rolling_wheelbase(const GroundRobot& robot, const Kinemati
 // it moves as least squares of their speeds, which is what kinematics make of them.
 bool wheels_disagree(const GroundRobot& robot) {
   if (robot.drive != DriveKind::kOmni && robot.drive != DriveKind::kMecanum) return false;
-  return std::count_if(robot.wheels.begin(), robot.wheels.end(),
-                       [](const RobotWheel& w) { return w.driven; }) > 3;
+  return std::ranges::count_if(robot.wheels, [](const RobotWheel& w) { return w.driven; }) > 3;
 }
 
 bool is_noise(const std::string& key) { return key.find("_noise_") != std::string::npos; }

@@ -4,9 +4,9 @@
 #include <cassert>
 #include <sstream>
 
+#include "common/base/ranges.h"
 #include "common/score/density.h"
 #include "common/score/fitness.h"
-#include "common/trials/context.h"
 
 namespace gapfarm {
 namespace {
@@ -25,9 +25,7 @@ std::string describe(const CommandSpec& command) {
 }
 
 const CommandSpec* find_command(std::span<const CommandSpec> commands, const std::string& name) {
-  const auto found = std::find_if(commands.begin(), commands.end(),
-                                  [&](const CommandSpec& spec) { return spec.name == name; });
-  return found == commands.end() ? nullptr : &*found;
+  return find_by(commands, name, &CommandSpec::name);
 }
 
 }  // namespace
@@ -37,6 +35,14 @@ CommandSpec resolved_command(const Trial& trial, std::span<const CommandSpec> co
   assert(spec != nullptr);
   return {spec->name, trial.left.value_or(spec->left), trial.right.value_or(spec->right),
           trial.duration_s.value_or(spec->duration_s)};
+}
+
+std::vector<DrivenCommand> driven_commands(const TrialLog& log,
+                                           std::span<const CommandSpec> commands) {
+  return mapped(log.trials, [&](const Trial& trial) {
+    const CommandSpec c = resolved_command(trial, commands);
+    return DrivenCommand{c.left, c.right, c.duration_s};
+  });
 }
 
 Result<MotionModel> MotionModel::mine(const TrialLog& log, std::span<const CommandSpec> commands,
@@ -104,11 +110,7 @@ Result<double> MotionModel::log_density(const Pose& X_WS, const CommandSpec& com
 }
 
 std::vector<LoggedMotion> logged_motions(const Problem& problem) {
-  std::vector<DrivenCommand> driven;
-  for (const Trial& trial : problem.log.trials) {
-    const CommandSpec c = resolved_command(trial, problem.commands);
-    driven.push_back({c.left, c.right, c.duration_s});
-  }
+  const std::vector<DrivenCommand> driven = driven_commands(problem.log, problem.commands);
   const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
   std::vector<LoggedMotion> facts;
   for (std::size_t i = 0; i < driven.size(); ++i) {

@@ -2,14 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 #include <span>
-#include <tuple>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/math/mcd.h"
 #include "common/problem/problem.h"
+#include "common/trials/context.h"
 #include "common/trials/trial.h"
 
 namespace gapfarm {
@@ -35,6 +34,10 @@ struct PosePrediction {
 
 // `trial` with the duties and duration of its command filled in.  REQUIRES: the command exists.
 CommandSpec resolved_command(const Trial& trial, std::span<const CommandSpec> commands);
+
+// The same of every trial of a log, as trial_contexts() wants them.
+std::vector<DrivenCommand> driven_commands(const TrialLog& log,
+                                           std::span<const CommandSpec> commands);
 
 class MotionModel {
  public:

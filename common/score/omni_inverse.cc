@@ -1,6 +1,5 @@
 #include "common/score/omni_inverse.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/math/algebra.h"

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/score/density.h"
 
@@ -73,9 +74,8 @@ Result<double> TailedDensity::log_density_of(const Eigen::Matrix<double, N, 1>& 
                                              double outlier_share) const {
   using Matrix = Eigen::Matrix<double, N, N>;
   using Array = Eigen::Array<double, N, 1>;
-  const auto whole = FactorisedCovariance<N>::factorise(covariance);
-  if (!whole) return whole.error();
-  if (tails_.gaussian()) return log_predictive_density(residual, *whole, outlier_share);
+  ASSIGN_OR_RETURN(const auto whole, FactorisedCovariance<N>::factorise(covariance));
+  if (tails_.gaussian()) return log_predictive_density(residual, whole, outlier_share);
   const auto readings = FactorisedCovariance<N>::factorise(reading);
   if (!readings) return Error{"of the readings: " + readings.error().message};
   // In axes in which the readings' covariance is 1 and the drive's diagonal, every pair of scales
@@ -99,7 +99,7 @@ Result<double> TailedDensity::log_density_of(const Eigen::Matrix<double, N, 1>& 
                          0.5 * (N * kLogTwoPi + readings->log_determinant());
   if (outlier_share == 0) return mixture;
   const std::array<double, 2> both = {std::log1p(-outlier_share) + mixture,
-                                      std::log(outlier_share) + log_tail_density(residual, *whole)};
+                                      std::log(outlier_share) + log_tail_density(residual, whole)};
   return log_sum_exp(both);
 }
 
@@ -136,11 +136,10 @@ Result<double> expected_log_density(const TailedDensity& density, const NoiseTai
     const double a = draw_tail_scale(tails.drive, stream);
     const double b = draw_tail_scale(tails.reading, stream);
     const Eigen::Matrix3d drawn = a * drive + b * reading;
-    const Result<Covariance3> factor = Covariance3::factorise(drawn);
-    if (!factor) return factor.error();
+    ASSIGN_OR_RETURN(const auto factor, Covariance3::factorise(drawn));
     Eigen::Vector3d z;
     for (double& value : z) value = stream.normal();
-    const auto score = density.log_density(factor->lower() * z, covariance, reading, outlier_share);
+    const auto score = density.log_density(factor.lower() * z, covariance, reading, outlier_share);
     if (!score) return score.error();
     sum += *score;
   }

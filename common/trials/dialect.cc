@@ -56,9 +56,8 @@ bool are_units(const CsvRow& row) {
 
 bool are_unique(const CsvRow& row) {
   std::set<std::string> seen;
-  return std::all_of(row.fields.begin(), row.fields.end(), [&](const CsvField& f) {
-    return f.text.empty() || seen.insert(f.text).second;
-  });
+  return std::ranges::all_of(
+      row.fields, [&](const CsvField& f) { return f.text.empty() || seen.insert(f.text).second; });
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #include "common/trials/format.h"
 
-#include <algorithm>
 #include <vector>
 
+#include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -37,9 +37,7 @@ std::vector<std::string> names_of(std::string_view line) {
 
 TextFormat sniff_table(std::string_view line) {
   const std::vector<std::string> names = names_of(line);
-  const auto column = [&](std::string_view name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
+  const auto column = [&](std::string_view name) { return contains(names, name); };
   if (column("millisecond") && column("x")) return TextFormat::kRacquetball;
   if (column("cov_xx")) return TextFormat::kPrediction;
   if (column("object")) return TextFormat::kPushLog;

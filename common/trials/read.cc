@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/trials/bbautotune.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
@@ -113,8 +114,7 @@ void add_file(const std::string& file, const std::vector<Part*>& parts, AddSampl
               std::vector<std::string>& read, Mistakes& mistakes) {
   const auto text = read_text_file(file);
   if (!text.ok()) return mistakes.add_file(text.error());
-  std::vector<TrialLog*> logs;
-  for (Part* part : parts) logs.push_back(&part->log);
+  std::vector<TrialLog*> logs = mapped(parts, [](Part* part) { return &part->log; });
   read.push_back(file);
   add(*text, file, logs, mistakes);
 }
@@ -261,8 +261,7 @@ Result<TrialLog> read_trial_files(std::span<const std::string> paths,
   }
   read_tips(parts, log.files, mistakes);
   if (options.paths.empty()) read_paths_beside(parts, log, mistakes);
-  std::vector<Part*> all;
-  for (Part& part : parts) all.push_back(&part);
+  std::vector<Part*> all = mapped(parts, [](Part& part) { return &part; });
   for (const std::string& file : options.paths) {
     add_file(file, all, add_paths, log.files, mistakes);
   }

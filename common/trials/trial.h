@@ -49,8 +49,7 @@ struct TrialLog {
   std::vector<std::string> files;
 
   bool has_paths() const {
-    return std::any_of(trials.begin(), trials.end(),
-                       [](const Trial& t) { return !t.path.empty(); });
+    return std::ranges::any_of(trials, [](const Trial& t) { return !t.path.empty(); });
   }
   // Whether it is a push log: its commands are pieces, and a finger's way comes with each trial.
   bool has_tips() const {

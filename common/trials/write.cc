@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/base/text.h"
 #include "common/trials/files.h"
 #include "common/trials/mark.h"
 #include "common/trials/text/columns.h"
@@ -14,11 +15,7 @@
 namespace gapfarm {
 namespace {
 
-std::string header(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ",") + csv_field(name);
-  return text;
-}
+std::string header(const std::vector<std::string>& names) { return joined(names, ",", csv_field); }
 
 std::string optional_double(const std::optional<double>& value) {
   return value ? format_double(*value) : std::string();

@@ -1,11 +1,11 @@
 #include "common/usage/usage.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <regex>
-#include <sstream>
+
+#include "common/base/text.h"
 
 namespace gapfarm {
 namespace {
@@ -14,9 +14,7 @@ bool is_whole(const std::string& number) { return number.find('.') == std::strin
 
 std::string shown(const std::string& number) {
   if (is_whole(number)) return number;
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", std::strtod(number.c_str(), nullptr));
-  return text;
+  return formatted("%g", std::strtod(number.c_str(), nullptr));
 }
 
 // "a whole number from 0 to 4096", of the two ends as CLI11 writes them.

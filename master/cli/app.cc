@@ -13,7 +13,6 @@
 #include "common/base/suggest.h"
 #include "common/process/stop.h"
 #include "common/usage/usage.h"
-#include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 
@@ -26,8 +25,7 @@ class UserInterrupts {
  public:
   explicit UserInterrupts(StopSource* stop);
   ~UserInterrupts();
-  UserInterrupts(const UserInterrupts&) = delete;
-  UserInterrupts& operator=(const UserInterrupts&) = delete;
+  UserInterrupts& operator=(UserInterrupts&&) = delete;
 };
 
 // A handler takes no argument, so the one instance that signals go to has to be global.

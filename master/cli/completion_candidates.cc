@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/config/config.h"
 
 namespace gapfarm {
@@ -25,67 +26,29 @@ enum class Takes {
   kCommand,
 };
 
+// "gapfarm COMMAND" is omitted: an option means the same everywhere.
 struct OptionTakes {
-  const char* option;  // "gapfarm COMMAND" is omitted: a name means the same everywhere
   Takes takes;
+  std::vector<std::string_view> options;
 };
 
-constexpr OptionTakes kOptionTakes[] = {
-    {"CONFIG", Takes::kConfig},
-    {"RUN", Takes::kRun},
-    {"CONFIG|MODEL", Takes::kConfig},
-    {"RUN|MODEL", Takes::kModel},
-    {"RUN|CONFIG", Takes::kModel},
-    {"CONFIG|RUN|DIAGNOSIS", Takes::kModel},
-    {"RUN|DIAGNOSIS", Takes::kRun},
-    {"MODEL", Takes::kModel},
-    {"DIAGNOSIS", Takes::kDiagnosis},
-    {"FOLDER", Takes::kRun},
-    {"DIR", Takes::kFolder},
-    {"FILE", Takes::kFile},
-    {"FILES", Takes::kFile},
-    {"LOG", Takes::kFile},
-    {"LOG|URDF", Takes::kFile},
-    {"--model", Takes::kModel},
-    {"--from", Takes::kModel},
-    {"--effects", Takes::kEffect},
-    {"--exclude", Takes::kEffect},
-    {"--set", Takes::kSetting},
-    {"--range", Takes::kSetting},
-    {"--fix", Takes::kSetting},
-    {"--genes", Takes::kParameter},
-    {"--free", Takes::kParameter},
-    {"--sweep", Takes::kParameter},
-    {"--command", Takes::kCommand},
-    {"--commands", Takes::kCommand},
-    {"--config", Takes::kConfig},
-    {"--keys", Takes::kFolder},
-    {"--keep", Takes::kFolder},
-    {"--runs", Takes::kFolder},
-    {"--figures", Takes::kFolder},
-    {"--foreign", Takes::kFolder},
-    {"--truth", Takes::kFolder},
-    {"--reference", Takes::kRun},
-    {"--trials", Takes::kFile},
-    {"--paths", Takes::kFile},
-    {"--history", Takes::kFile},
-    {"--mined", Takes::kFile},
-    {"--like", Takes::kFile},
-    {"--log", Takes::kFile},
-    {"--out", Takes::kFile},
-    {"--map", Takes::kFile},
-    {"--picture", Takes::kFile},
-    {"--urdf", Takes::kFile},
-    {"--controllers", Takes::kFile},
-    {"--robot", Takes::kConfig},
-    {"--key", Takes::kFile},
-    {"--run", Takes::kRun},
-    {"--site", Takes::kFile},
-    {"--ssh-config", Takes::kFile},
-    {"--worker-program", Takes::kFile},
-    {"--worker-keys", Takes::kFolder},
-    {"--worker-logs", Takes::kFolder},
-};
+const std::vector<OptionTakes> kOptionTakes = {
+    {Takes::kConfig, {"CONFIG", "CONFIG|MODEL", "--config", "--robot"}},
+    {Takes::kRun, {"RUN", "RUN|DIAGNOSIS", "FOLDER", "--reference", "--run"}},
+    {Takes::kModel,
+     {"RUN|MODEL", "RUN|CONFIG", "CONFIG|RUN|DIAGNOSIS", "MODEL", "--model", "--from"}},
+    {Takes::kDiagnosis, {"DIAGNOSIS"}},
+    {Takes::kFolder,
+     {"DIR", "--keys", "--keep", "--runs", "--figures", "--foreign", "--truth", "--worker-keys",
+      "--worker-logs"}},
+    {Takes::kFile,
+     {"FILE", "FILES", "LOG", "LOG|URDF", "--trials", "--paths", "--history", "--mined", "--like",
+      "--log", "--out", "--map", "--picture", "--urdf", "--controllers", "--key", "--site",
+      "--ssh-config", "--worker-program"}},
+    {Takes::kEffect, {"--effects", "--exclude"}},
+    {Takes::kSetting, {"--set", "--range", "--fix"}},
+    {Takes::kParameter, {"--genes", "--free", "--sweep"}},
+    {Takes::kCommand, {"--command", "--commands"}}};
 
 // Words that an option takes and no validator of its own lists.
 struct OptionChoices {
@@ -240,7 +203,7 @@ void add_values(const Place& place, const CLI::Option& option, const std::string
   for (const std::string& word : choices) found.push_back({word, ""});
   if (!choices.empty()) return;
   for (const OptionTakes& row : kOptionTakes) {
-    if (name != row.option) continue;
+    if (!contains(row.options, name)) continue;
     const bool of_problem = row.takes == Takes::kEffect || row.takes == Takes::kParameter ||
                             row.takes == Takes::kSetting || row.takes == Takes::kCommand;
     if (of_problem) {
@@ -288,9 +251,7 @@ std::vector<CompletionCandidate> completion_candidates(const CLI::App& app,
   std::erase_if(found, [&](const CompletionCandidate& c) {
     return c.word.rfind(begun, 0) != 0 || !seen.insert(c.word).second;
   });
-  std::sort(
-      found.begin(), found.end(),
-      [](const CompletionCandidate& a, const CompletionCandidate& b) { return a.word < b.word; });
+  std::ranges::sort(found, {}, &CompletionCandidate::word);
   return found;
 }
 

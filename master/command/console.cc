@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
@@ -42,7 +41,7 @@ Console::Console(std::FILE* out, std::FILE* err, Clock clock)
 
 Console::~Console() { clear_progress(); }
 
-void Console::result(std::string_view text, const nlohmann::ordered_json& value) {
+void Console::result(std::string_view text, const Json& value) {
   if (!json_) return print(text);
   // What comes from a log's text may be anything.
   print(json_text(value, 2) + "\n");

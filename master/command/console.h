@@ -4,12 +4,11 @@
 
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <string>
 #include <string_view>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 #include "common/log/log.h"
 #include "common/progress/number_text.h"
 #include "common/progress/overall_progress.h"
@@ -25,15 +24,14 @@ class Console {
 
   explicit Console(std::FILE* out = stdout, std::FILE* err = stderr, Clock clock = steady_now_s);
   ~Console();
-  Console(const Console&) = delete;
-  Console& operator=(const Console&) = delete;
+  Console& operator=(Console&&) = delete;
 
   // From now on results are JSON.
   void use_json() { json_ = true; }
   bool json() const { return json_; }
 
   // What came of a command, once: the text, or with --json the value.
-  void result(std::string_view text, const nlohmann::ordered_json& value);
+  void result(std::string_view text, const Json& value);
   // To be called last: with --json, where no result was shown, {"error": {"message", "exit_code"}}
   // with all that error() was given.  Returns `exit_code`.
   int end(int exit_code);

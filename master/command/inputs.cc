@@ -8,11 +8,7 @@
 
 #include "common/base/build_info.h"
 #include "common/base/try.h"
-#include "common/config/config.h"
-#include "common/problem/run_files.h"
 #include "common/trials/files.h"
-#include "common/trials/read.h"
-#include "master/command/console.h"
 #include "master/command/long_command.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"
@@ -181,9 +177,8 @@ Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettin
   return RecordedWork{std::move(farm), std::move(recorded)};
 }
 
-Result<int> print_dry_run(const std::string& would, nlohmann::ordered_json facts,
-                          const FarmOptions& options, const FarmSettings& settings,
-                          CliContext& context) {
+Result<int> print_dry_run(const std::string& would, Json facts, const FarmOptions& options,
+                          const FarmSettings& settings, CliContext& context) {
   RETURN_IF_ERROR(check_farm(options, settings));
   const unsigned workers = local_workers(options, settings);
   const std::vector<std::string> endpoints = endpoints_of(options, settings);

@@ -4,9 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -41,8 +39,7 @@ class NotesGoTo {
     if (log.format() == LogFormat::kJson) console_.use(&log);
   }
   ~NotesGoTo() { console_.use(nullptr); }
-  NotesGoTo(const NotesGoTo&) = delete;
-  NotesGoTo& operator=(const NotesGoTo&) = delete;
+  NotesGoTo& operator=(NotesGoTo&&) = delete;
 
  private:
   Console& console_;
@@ -110,9 +107,8 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
 
 // Where --dry-run ends a command whose input is checked: says what `would` be done ("evolve 7
 // parameters ...") and by whom, with `facts` for --json.
-Result<int> print_dry_run(const std::string& would, nlohmann::ordered_json facts,
-                          const FarmOptions& options, const FarmSettings& settings,
-                          CliContext& context);
+Result<int> print_dry_run(const std::string& would, Json facts, const FarmOptions& options,
+                          const FarmSettings& settings, CliContext& context);
 
 // A farm that is asked through the command's LongCommand.
 struct RecordedWork {

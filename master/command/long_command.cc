@@ -259,9 +259,8 @@ void LongCommand::stage(const std::string& name) {
 
 void LongCommand::found(Finding finding) {
   std::vector<StageFinding>& all = record_.findings;
-  const auto same = std::find_if(all.begin(), all.end(), [&](const StageFinding& f) {
-    return f.found.about == finding.about;
-  });
+  const auto same = std::ranges::find_if(
+      all, [&](const StageFinding& f) { return f.found.about == finding.about; });
   if (same != all.end()) all.erase(same);
   all.push_back({stage_, std::move(finding)});
   write_record();
@@ -285,8 +284,7 @@ void LongCommand::on_progress(const RecordedProgress& progress, const SocketFarm
   workers_ = farm.workers();
   fleets_ = farm.fleets();
   const auto there = std::count_if(workers_.begin(), workers_.end(), present);
-  const std::string waiting =
-      wait.message(static_cast<std::size_t>(there), steady_now_s()).value_or("");
+  const std::string waiting = wait.message(there, steady_now_s()).value_or("");
   const bool news = waiting.empty() != waiting_.empty();
   waiting_ = waiting;
   show(news);

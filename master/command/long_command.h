@@ -23,7 +23,6 @@ struct CliContext;
 // What this process was called with: "gapfarm diagnose ...".
 std::string command_line();
 
-// Where a command keeps what it simulated.
 struct KeepingPlace {
   std::filesystem::path folder;
   bool passing = false;  // made for this purpose only: goes when the command ends well
@@ -54,8 +53,7 @@ class LongCommand {
   // Without a folder: progress only.
   LongCommand(std::string command, std::vector<ProgressStage> stages, Console& console);
   ~LongCommand();
-  LongCommand(const LongCommand&) = delete;
-  LongCommand& operator=(const LongCommand&) = delete;
+  LongCommand& operator=(LongCommand&&) = delete;
 
   // The farm to ask from now on, for as long as it lives; `farm` and this outlive it.
   std::unique_ptr<Farm> over(SocketFarm& farm);

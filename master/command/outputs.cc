@@ -13,7 +13,6 @@
 #include "common/config/config.h"
 #include "common/trials/files.h"
 #include "common/trials/select.h"
-#include "master/command/inputs.h"
 #include "master/store/command_record.h"
 
 namespace gapfarm {
@@ -185,8 +184,7 @@ Status Outputs::plan_again(const std::string& path) {
 }
 
 Status Outputs::write(const std::string& path, std::string_view bytes) const {
-  const auto planned = std::find_if(planned_.begin(), planned_.end(),
-                                    [&](const Planned& other) { return other.path == path; });
+  const auto planned = std::ranges::find(planned_, path, &Planned::path);
   const bool replace = planned != planned_.end() ? planned->replace : force_;
   return write_file_atomically(path, bytes, replace ? IfThere::kReplace : IfThere::kKeep);
 }
@@ -237,8 +235,7 @@ Status TracedCommands::choose(const std::vector<CommandSpec>& known, TraceSettin
   to->commands = known;
   if (!names.empty()) to->commands.clear();
   for (const std::string& name : names) {
-    const auto found = std::find_if(known.begin(), known.end(),
-                                    [&](const CommandSpec& c) { return c.name == name; });
+    const auto found = std::ranges::find(known, name, &CommandSpec::name);
     if (found == known.end()) {
       return Error{"there is no command '" + name + "'" + suggestion(name, command_names(known))};
     }

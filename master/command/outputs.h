@@ -23,7 +23,6 @@ Status check_folder(const std::string& folder, FolderKind kind);
 // work begins, when a mistake costs nothing, and written afterwards.
 class Outputs {
  public:
-  // --force.
   void declare(CLI::App& app);
 
   // An output is never one of these, however it is spelt and even with --force.

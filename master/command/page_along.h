@@ -29,8 +29,7 @@ struct PageOption {
 class PageAlong {
  public:
   ~PageAlong();
-  PageAlong(const PageAlong&) = delete;
-  PageAlong& operator=(const PageAlong&) = delete;
+  PageAlong& operator=(PageAlong&&) = delete;
 
   // Errors: the program cannot be started, the port is taken; as the server says it.
   static Result<std::unique_ptr<PageAlong>> start(const std::filesystem::path& folder,

@@ -1,13 +1,14 @@
 #include "master/diagnose/diagnose.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "common/base/guarded.h"
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
+#include "common/progress/stage_clock.h"
 #include "common/trials/select.h"
 #include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
@@ -19,82 +20,54 @@ namespace gapfarm {
 namespace {
 
 Status check_excluded(const Problem& problem, const std::vector<std::string>& excluded) {
-  std::vector<std::string> known;
-  for (const Effect& effect : problem.table().effects()) known.push_back(effect.name);
+  std::vector<std::string> known = mapped(problem.table().effects(), &Effect::name);
   for (const std::string& name : excluded) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
+    if (!contains(known, name)) {
       return Error{"there is no effect '" + name + "' to omit" + suggestion(name, known)};
     }
   }
   return {};
 }
 
-// Says which of kDiagnosisStages is on, and how long each took.
-class Stages {
- public:
-  explicit Stages(const DiagnoseOptions& options) : options_(options) {}
-
-  void begin(std::size_t stage) {
-    end();
-    present_ = kDiagnosisStages[stage].name;
-    began_ = Clock::now();
-    if (options_.on_stage) options_.on_stage(present_);
-  }
-  void end() {
-    if (present_.empty()) return;
-    took_s_.emplace_back(present_, std::chrono::duration<double>(Clock::now() - began_).count());
-    present_.clear();
-  }
-  const std::string& present() const { return present_; }
-  const std::vector<std::pair<std::string, double>>& took_s() const { return took_s_; }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  const DiagnoseOptions& options_;
-  std::string present_;  // empty: none
-  Clock::time_point began_;
-  std::vector<std::pair<std::string, double>> took_s_;
-};
-
 // The steps in the order of docs/diagnosis.md.
-Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, Stages* stages) {
+Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, StageClock* stages) {
   steps::PartialResult known;
   const auto end_with = [&](const Error& error) -> Result<DiagnosisResult> {
     // What cannot be simulated is no reason to be without a report.
     if (error.code != ErrorCode::kSimulation) return error;
-    return fail_with_partial_report(of, known, stages->present(), error);
+    return fail_with_partial_report(of, known, stages->present, error);
   };
-  stages->begin(0);
+  stages->begin(kDiagnosisStages[0].name);
   const Result<Study> tuned = guarded([&] { return steps::tune(of); });
   if (!tuned) return end_with(tuned.error());
   known.tuned = &*tuned;
   emit_base(of, *tuned);
 
-  stages->begin(1);
+  stages->begin(kDiagnosisStages[1].name);
   const Result<steps::Evidence> measured = guarded([&] { return steps::measure(of, *tuned); });
   if (!measured) return end_with(measured.error());
   emit_noise(of, measured->study);
 
-  stages->begin(2);
+  stages->begin(kDiagnosisStages[2].name);
   const Result<steps::Screening> screening = guarded([&] { return steps::screen(of, *measured); });
   if (!screening) return end_with(screening.error());
   known.screening = &*screening;
   emit_readings(of, screening->found);
   emit_choice(of, screening->found, screening->warning.has_value());
 
-  stages->begin(3);
+  stages->begin(kDiagnosisStages[3].name);
   const Result<steps::Judgement> judgement = guarded([&] { return steps::judge(of, *screening); });
   if (!judgement) return end_with(judgement.error());
   known.judged = &*judgement;
   emit_verdict(of, *judgement);
 
-  stages->begin(4);
+  stages->begin(kDiagnosisStages[4].name);
   const Result<steps::Refit> refit =
       guarded([&] { return steps::refit(of, *measured, *screening, *judgement); });
   if (!refit) return end_with(refit.error());
   known.judged = &refit->judged;
 
-  stages->begin(5);
+  stages->begin(kDiagnosisStages[5].name);
   auto result =
       guarded([&] { return steps::report(of, *known.screening, steps::add_shape(of, *refit)); });
   return result ? std::move(result) : end_with(result.error());
@@ -120,10 +93,8 @@ double middle(const TrialLog& log, double Pose::*coordinate) {
 }
 
 bool far_out(const TrialLog& log) {
-  std::vector<double> reaches;
-  for (const Trial& t : log.trials) {
-    reaches.push_back(std::max(std::abs(t.X_WS.x), std::abs(t.X_WS.y)));
-  }
+  std::vector<double> reaches = mapped(
+      log.trials, [](const Trial& t) { return std::max(std::abs(t.X_WS.x), std::abs(t.X_WS.y)); });
   return !reaches.empty() && quantile(reaches, 0.95) > kNearWorld_m;
 }
 
@@ -141,16 +112,16 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   const PreparedLog log = prepare_log(problem, options.frame_m);
   if (any_unusable(log.sanity)) return unusable_result(log);
   Predictor predictor(farm, log.problem);
-  Stages stages(options);
+  StageClock stages(options.on_stage);
   const std::uint64_t undefined_before = undefined_laws();
   auto result = take_steps({farm, predictor, log.problem, *subject, options,
                             Eigen::Vector2d(log.frame_x_m, log.frame_y_m)},
                            &stages);
   if (!result) return result;
-  stages.end();
+  stages.begin("");
   Diagnosis& d = result->diagnosis;
   if (undefined_laws() != undefined_before) warn_of_undefined_tests(&d);
-  d.timing_s = stages.took_s();
+  d.timing_s = stages.timing_s;
   d.sanity.insert(d.sanity.end(), log.sanity.begin(), log.sanity.end());
   fill_conclusions(*subject->effects, &d);
   return result;

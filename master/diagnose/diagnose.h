@@ -78,7 +78,6 @@ struct PreparedLog {
 PreparedLog prepare_log(const Problem& problem,
                         const std::optional<Eigen::Vector2d>& frame_m = std::nullopt);
 
-// The answer where a log cannot be used, without any simulation.
 DiagnosisResult unusable_result(const PreparedLog& log);
 
 }  // namespace gapfarm

@@ -30,9 +30,7 @@ const EffectDiagnoses& drive_effect_diagnoses() {
 }
 
 const EffectDiagnosis* EffectDiagnoses::find(std::string_view effect) const {
-  const auto found = std::find_if(rows_.begin(), rows_.end(), [&](const EffectDiagnosis* row) {
-    return row->effect == effect;
-  });
+  const auto found = std::ranges::find(rows_, effect, &EffectDiagnosis::effect);
   return found == rows_.end() ? nullptr : *found;
 }
 
@@ -54,9 +52,8 @@ const EffectDiagnosis& effect_diagnosis(std::string_view effect) {
 
 const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p) {
   const std::vector<WorldPlace>& places = effects.row(p.effect).places;
-  const auto found = std::find_if(places.begin(), places.end(), [&](const WorldPlace& place) {
-    return p.key == p.effect + "." + place.key;
-  });
+  const auto found = std::ranges::find_if(
+      places, [&](const WorldPlace& place) { return p.key == p.effect + "." + place.key; });
   return found == places.end() ? nullptr : &*found;
 }
 

@@ -23,7 +23,6 @@ namespace gapfarm {
 
 inline constexpr double kDegrees = 180 / std::numbers::pi;  // of a radian
 
-// How a parameter is reported: the words around its value in a unit that people use.
 struct ShownParameter {
   const char* key;
   double factor;
@@ -75,7 +74,6 @@ struct EffectFamily {
 inline constexpr EffectFamily kReachFamily{0.75};  // how far every command drives
 inline constexpr EffectFamily kSlopeFamily{0.15};  // what pulls one way on all the floor
 
-// A parameter that is a place in the world.
 struct WorldPlace {
   const char* key;
   int axis;  // 0: x, 1: y, -1: what the effect's `axis` says
@@ -157,7 +155,6 @@ struct EffectDiagnosis {
   const SpreadRow* spread = nullptr;  // of an effect that makes some trials outliers
 };
 
-// The effects that a scenario's diagnosis knows.
 class EffectDiagnoses {
  public:
   explicit EffectDiagnoses(std::vector<const EffectDiagnosis*> rows) : rows_(std::move(rows)) {}
@@ -186,7 +183,6 @@ const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p);
 // again.
 EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, const char* sentence);
 
-// Strength and direction from the cosine's and sine's coefficients.
 void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string, double>* values);
 
 // Standard deviation, in the unit of table row `row`, of what the fit's linearisation cannot see:

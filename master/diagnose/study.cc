@@ -6,9 +6,9 @@
 #include <map>
 #include <tuple>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
-#include "master/diagnose/evidence/residuals.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/subject.h"
 
@@ -63,9 +63,7 @@ bool has_logarithm(const Parameter& p, double value) { return p.lower >= 0 && va
 
 DriveBase program_base(const Problem& problem, std::span<const Gene> genes) {
   const std::vector<Parameter>& declared = problem.external->table.declaration().parameters;
-  const auto searched = [&](std::size_t row) {
-    return std::any_of(genes.begin(), genes.end(), [&](const Gene& g) { return g.row == row; });
-  };
+  const auto searched = [&](std::size_t row) { return contains(genes, row, &Gene::row); };
   bool any = false;
   for (std::size_t row = 0; row < declared.size(); ++row) any |= searched(row);
   DriveBase base;
@@ -108,8 +106,7 @@ void Study::drop_ignored(Eigen::Ref<Eigen::MatrixXd> rows) const {
 }
 
 Eigen::VectorXd Study::whitened_residuals() const {
-  std::vector<Eigen::Vector3d> residuals;
-  for (const ResidualTrial& t : trials) residuals.push_back(t.residual);
+  std::vector<Eigen::Vector3d> residuals = mapped(trials, &ResidualTrial::residual);
   return whiten(residuals);
 }
 
@@ -157,11 +154,7 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes) {
   study.drive = drive_base(problem, genes);
   study.scale = problem.treads().scale();
   study.base_parameters = study.drive.tuned;
-  std::vector<DrivenCommand> driven;
-  for (const Trial& trial : problem.log.trials) {
-    const CommandSpec c = resolved_command(trial, problem.commands);
-    driven.push_back({c.left, c.right, c.duration_s});
-  }
+  const std::vector<DrivenCommand> driven = driven_commands(problem.log, problem.commands);
   const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
   std::map<std::tuple<std::string, double, double, double>, std::size_t> cells;
   std::map<std::string, std::size_t> sessions;

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -39,7 +38,6 @@ struct NoiseRow {
   double unit = 1;
 };
 
-// How the pictures show a trial.
 struct TrialView {
   Pose X_WV;            // ends are seen from here
   double turn_rad = 0;  // residuals are reported in the predicted end's axes turned by this

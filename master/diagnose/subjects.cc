@@ -5,6 +5,7 @@
 #include <memory>
 #include <numbers>
 
+#include "common/base/ranges.h"
 #include "common/parameters/push.h"
 #include "common/pose/pose.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -22,10 +23,9 @@ PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
   const auto sketch = std::make_shared<const PatchSketch>(predictor.problem(), study);
   return
       [sketch](const Regression& explained, const PatchWish& wish) -> Result<std::vector<Patch>> {
-        std::vector<Patch> patches;
-        for (const PatchSketch::Place& place : sketch->search(explained, wish)) {
-          patches.push_back(place.patch);
-        }
+        std::vector<Patch> patches =
+            mapped(sketch->search(explained, wish),
+                   [](const PatchSketch::Place& place) { return place.patch; });
         return patches;
       };
 }
@@ -198,9 +198,8 @@ std::shared_ptr<const DiagnosisSubject> diagnosis_subject(const Problem& problem
   static const std::array<std::shared_ptr<const DiagnosisSubject>, 2> subjects = {
       std::make_shared<const DiagnosisSubject>(srv1_subject()),
       std::make_shared<const DiagnosisSubject>(push_subject())};
-  const auto found = std::find_if(subjects.begin(), subjects.end(), [&](const auto& subject) {
-    return problem.scenario == subject->scenario;
-  });
+  const auto found = std::ranges::find_if(
+      subjects, [&](const auto& subject) { return problem.scenario == subject->scenario; });
   return found == subjects.end() ? nullptr : *found;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/try.h"
 #include "gapfarm/v1/problem.pb.h"
 #include "gapfarm/v1/task.pb.h"
 #include "master/farm/sites/fleet_status.h"
@@ -50,13 +51,11 @@ class Farm {
                         const TakeAnswer& take,
                         const std::function<void(const FarmProgress&)>& on_progress = {}) {
     for (std::size_t place = 0; !tasks.empty();) {
-      const auto results = run(problem_hash, tasks, on_progress);
-      if (!results) return results.error();
+      ASSIGN_OR_RETURN(const auto results, run(problem_hash, tasks, on_progress));
       tasks.clear();
-      for (const v1::TaskResult& result : *results) {
-        auto more = take(place++, result);
-        if (!more) return more.error();
-        std::move(more->begin(), more->end(), std::back_inserter(tasks));
+      for (const v1::TaskResult& result : results) {
+        ASSIGN_OR_RETURN(auto more, take(place++, result));
+        std::move(more.begin(), more.end(), std::back_inserter(tasks));
       }
     }
     return {};
@@ -71,5 +70,13 @@ class Farm {
 
 // What run() returns when a stop was requested; its code is kStopped.
 inline Error stop_requested() { return {"stopped by request", ErrorCode::kStopped}; }
+
+// An error where `what` did not end well, with the `remedy`, if there is one.
+inline Status ended_well(const v1::TaskResult& result, const std::string& what = "the simulation",
+                         const std::string& remedy = "") {
+  if (result.outcome() == v1::OK) return {};
+  return Error{what + " ended with " + v1::Outcome_Name(result.outcome()) + " (" +
+               result.message() + ")" + remedy};
+}
 
 }  // namespace gapfarm

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 #include <random>
-#include <utility>
 
+#include "common/base/ranges.h"
 #include "common/problem/question.h"
 #include "gapfarm/v1/task.pb.h"
 
@@ -119,12 +119,10 @@ bool JobQueue::take_retry(const WorkerIdentity& worker, const HostCounts& hosts,
   const auto fits = [&](std::size_t index) {
     const std::vector<Fault>& faults = faults_.at(index);
     const auto failed_on = [&](const std::string& host) {
-      return std::any_of(faults.begin(), faults.end(),
-                         [&](const Fault& fault) { return fault.host == host; });
+      return contains(faults, host, &Fault::host);
     };
-    return !failed_on(worker.host) || std::all_of(hosts.begin(), hosts.end(), [&](const auto& h) {
-      return failed_on(h.first);
-    });
+    return !failed_on(worker.host) ||
+           std::ranges::all_of(hosts, [&](const auto& h) { return failed_on(h.first); });
   };
   const auto at = std::find_if(retries_.begin(), retries_.end(), fits);
   if (at == retries_.end()) return false;
@@ -153,7 +151,7 @@ bool JobQueue::take_straggler(const WorkerIdentity& worker, double now, v1::Job*
     if (now - attempt.since <= patience()) return false;  // the rest is younger
     if (!attempt.live || attempt.worker == worker.id || jobs_[attempt.job].done) continue;
     const auto& out = jobs_[attempt.job].out;
-    if (std::find(out.begin(), out.end(), 0u) == out.end()) continue;
+    if (!contains(out, 0u)) continue;
     ++copied_;
     hand_out(attempt.job, worker, now, job);
     return true;
@@ -312,9 +310,7 @@ Blamed JobQueue::blame(const WorkerIdentity& worker, std::uint64_t attempt_id, E
   std::vector<Fault>& faults = faults_[index];
   faults.push_back({worker.name, worker.host, cause, failure});
   const auto kills =
-      static_cast<unsigned>(std::count_if(faults.begin(), faults.end(), [](const Fault& fault) {
-        return fault.cause == EndCause::kKilled;
-      }));
+      static_cast<unsigned>(std::ranges::count(faults, EndCause::kKilled, &Fault::cause));
   const auto failures = static_cast<unsigned>(faults.size()) - kills;
   if (failures < limits_.failures && kills < limits_.kills) {
     if (waits) wait_in_line(index);

@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "common/base/result.h"
 #include "common/process/process_pool.h"
@@ -19,8 +18,7 @@ class PrivateFolder {
   // In $TMPDIR or /tmp; in /tmp when $TMPDIR is too long for a socket's path.
   static Result<std::unique_ptr<PrivateFolder>> make();
   ~PrivateFolder();
-  PrivateFolder(const PrivateFolder&) = delete;
-  PrivateFolder& operator=(const PrivateFolder&) = delete;
+  PrivateFolder& operator=(PrivateFolder&&) = delete;
 
   std::string socket_path() const { return path_ + "/farm"; }
 
@@ -36,8 +34,7 @@ class LocalWorkers {
   LocalWorkers(std::string program, unsigned count, std::string endpoint, ProcessLimits limits);
   // Asks them to go (SIGTERM), then makes them (SIGKILL): they keep nothing that could be lost.
   ~LocalWorkers();
-  LocalWorkers(const LocalWorkers&) = delete;
-  LocalWorkers& operator=(const LocalWorkers&) = delete;
+  LocalWorkers& operator=(LocalWorkers&&) = delete;
 
   Status start() { return pool_.start(monotonic_seconds()); }
   ProcessPool& pool() { return pool_; }

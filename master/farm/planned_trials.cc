@@ -8,7 +8,6 @@
 
 #include "common/random/stream.h"
 #include "common/score/motion_model.h"
-#include "common/trials/context.h"
 
 namespace gapfarm {
 namespace {
@@ -123,12 +122,8 @@ std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
 }
 
 std::vector<std::vector<v1::PlannedTrial>> plan_of(const Problem& problem, const TrialLog& log) {
-  std::vector<DrivenCommand> driven;
-  for (const Trial& trial : log.trials) {
-    const CommandSpec c = resolved_command(trial, problem.commands);
-    driven.push_back({c.left, c.right, c.duration_s});
-  }
-  const std::vector<TrialContext> contexts = trial_contexts(log, driven);
+  const std::vector<TrialContext> contexts =
+      trial_contexts(log, driven_commands(log, problem.commands));
   std::vector<std::vector<v1::PlannedTrial>> plan;
   std::map<std::string, std::size_t> sessions;
   for (std::size_t i = 0; i < log.trials.size(); ++i) {

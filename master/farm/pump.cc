@@ -1,7 +1,5 @@
 #include "master/farm/pump.h"
 
-#include "common/net/envelope.h"
-
 namespace gapfarm {
 namespace {
 

@@ -4,13 +4,10 @@
 #include <cstdio>
 #include <map>
 #include <random>
-#include <string>
-#include <vector>
 
 #include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/net/envelope.h"
-#include "common/net/socket.h"
 #include "common/problem/problem.h"
 #include "master/farm/local_workers.h"
 #include "master/farm/pump.h"

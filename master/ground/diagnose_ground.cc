@@ -3,41 +3,17 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "common/base/guarded.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
+#include "common/progress/stage_clock.h"
 #include "master/ground/reference.h"
 #include "master/ground/report/ground_report.h"
-#include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
-
-// How long each stage took.
-class StageClock {
- public:
-  explicit StageClock(std::function<void(const std::string&)> on_stage)
-      : on_stage_(std::move(on_stage)) {}
-
-  void begin(const std::string& name) {
-    const auto now = std::chrono::steady_clock::now();
-    if (!running_.empty()) {
-      timing_s.emplace_back(running_, std::chrono::duration<double>(now - began_).count());
-    }
-    running_ = name;
-    began_ = now;
-    if (on_stage_ && !name.empty()) on_stage_(name);
-  }
-
-  std::vector<std::pair<std::string, double>> timing_s;
-
- private:
-  std::function<void(const std::string&)> on_stage_;
-  std::string running_;
-  std::chrono::steady_clock::time_point began_;
-};
 
 GroundQuestion ask_what_is_wrong(const GroundRobot& robot, const RunLog& log) {
   GroundQuestion question{kinematic_rows(robot), that_can_show(log, ground_hypotheses(robot)), {}};
@@ -135,18 +111,13 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
 constexpr std::size_t kMostOffersReported = 6;
 
 std::string things_of(const GroundSearch& search, const std::vector<std::size_t>& hypotheses) {
-  std::string text;
-  for (const std::size_t h : hypotheses) {
-    text += (text.empty() ? "" : ", ") + search.catalogue[h].thing;
-  }
-  return text;
+  return joined(hypotheses, ", ", [&](const std::size_t h) { return search.catalogue[h].thing; });
 }
 
 // Faults of the log are looked for before.
 std::size_t to_try(const GroundSearch& search) {
-  return static_cast<std::size_t>(
-      std::count_if(search.catalogue.begin(), search.catalogue.end(),
-                    [](const GroundHypothesis& h) { return !h.put_right; }));
+  return static_cast<std::size_t>(std::ranges::count_if(
+      search.catalogue, [](const GroundHypothesis& h) { return !h.put_right; }));
 }
 
 std::string nats_text(double nats) { return fmt::format("{:.1f}", nats); }
@@ -216,8 +187,7 @@ void emit_offers(const GroundWork& work, const GroundSearch& search,
   if (!work.on_finding) return;
   std::vector<const Offer*> best;
   for (const auto& [offer, fit] : tried) best.push_back(&offer);
-  std::stable_sort(best.begin(), best.end(),
-                   [](const Offer* a, const Offer* b) { return a->gain > b->gain; });
+  std::ranges::stable_sort(best, [](const Offer* a, const Offer* b) { return a->gain > b->gain; });
   // Most change nothing of what stands there.
   if (best.size() > kMostOffersReported &&
       best[kMostOffersReported - 1]->gain >= tried.back().first.gain &&

@@ -29,7 +29,6 @@ struct DrawnRatio {
 DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> baseline,
                        std::span<const std::size_t> run, std::uint64_t seed);
 
-// Medians over windows.
 struct WindowErrors {
   double position_m = 0;
   double heading_rad = 0;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/tolerances.h"
@@ -14,7 +15,6 @@ namespace {
 
 using std::numbers::pi;
 
-// Channels that change places when left and right do.
 std::vector<std::pair<std::size_t, std::size_t>> channel_pairs(const GroundRobot& robot) {
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   for (std::size_t i = 0; i < robot.channels.size(); ++i) {
@@ -76,13 +76,9 @@ class Catalogue {
   std::vector<GroundHypothesis> all;
 
  private:
-  bool has(const std::string& name) const {
-    return std::any_of(rows_.begin(), rows_.end(),
-                       [&](const KinematicRow& r) { return r.name == name; });
-  }
+  bool has(const std::string& name) const { return contains(rows_, name, &KinematicRow::name); }
   KinematicRow row(const std::string& name) const {
-    return *std::find_if(rows_.begin(), rows_.end(),
-                         [&](const KinematicRow& r) { return r.name == name; });
+    return *std::ranges::find(rows_, name, &KinematicRow::name);
   }
   void value(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
              std::vector<KinematicRow> freed) {

@@ -28,8 +28,7 @@ constexpr double kNeverSo = -1e300;    // nats
 std::vector<std::size_t> runs_of(const WindowSet& windows) {
   std::vector<std::size_t> runs;
   for (const int block : windows.block) {
-    const auto after =
-        std::upper_bound(windows.run_blocks.begin(), windows.run_blocks.end(), block);
+    const auto after = std::ranges::upper_bound(windows.run_blocks, block);
     runs.push_back(static_cast<std::size_t>(after - windows.run_blocks.begin()) - 1);
   }
   return runs;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/recordings/windows.h"
 #include "common/svg/svg.h"
@@ -48,10 +49,7 @@ Result<std::vector<Pose>> simulated_ends(Farm& farm, const Problem& problem) {
   task.mutable_predict();
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
   const v1::TaskResult& result = results.front();
-  if (result.outcome() != v1::OK) {
-    return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                 result.message() + ")"};
-  }
+  RETURN_IF_ERROR(ended_well(result));
   std::vector<Pose> ends;
   for (const v1::Predicted& p : result.predict().predictions()) ends.push_back(from_proto(p.end()));
   return ends;
@@ -95,8 +93,7 @@ Scale scale_of(const DrivenPath& path, SvgPoint corner) {
 
 void draw_path(const std::vector<Pose>& poses, const Scale& scale, const char* colour, double width,
                Svg* svg) {
-  std::vector<SvgPoint> points;
-  for (const Pose& X : poses) points.push_back(scale.at(X));
+  std::vector<SvgPoint> points = mapped(poses, [&](const Pose& X) { return scale.at(X); });
   svg->polyline(points, {"none", colour, width, {}, 0.9});
   svg->circle(points.back(), 3.5, {colour, "none"});
 }
@@ -183,9 +180,8 @@ Result<std::vector<SimulatedWindow>> simulate_window(Farm& farm, const Problem& 
 }
 
 std::vector<PathSample> measured_window(const RunLog& log, const Trial& window) {
-  const auto run = std::find_if(log.runs.begin(), log.runs.end(), [&](const LoggedRun& r) {
-    return session_of(r) == window.session;
-  });
+  const auto run = std::ranges::find_if(
+      log.runs, [&](const LoggedRun& r) { return session_of(r) == window.session; });
   std::vector<PathSample> path;
   if (run == log.runs.end()) return path;
   const double end_s = *window.t_s + *window.duration_s;

@@ -44,10 +44,10 @@ constexpr int kMostTraits = 3;
 double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, std::size_t grip) {
   for (double fall = kGripStep; fall < kMostUnsureGrip; fall += kGripStep) {
     Eigen::VectorXd values = fit.values;
-    values[static_cast<Eigen::Index>(grip)] -= fall;
+    values[grip] -= fall;
     double best = fitter.hold(fit.rows, values).objective;
     for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-      if (fit.rows[k].row.name == "grip_shape") values[static_cast<Eigen::Index>(k)] = kSharpGrip;
+      if (fit.rows[k].row.name == "grip_shape") values[k] = kSharpGrip;
     }
     best = std::max(best, fitter.hold(fit.rows, values).objective);
     if (fit.objective - best > kLeastGripGain) return fall / 2;
@@ -104,7 +104,7 @@ std::vector<FitRow> open_rows(const GroundRobot& robot, const std::vector<Kinema
 
 std::vector<FitRow> begun_at(std::vector<FitRow> rows, const Eigen::VectorXd& values) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    rows[k].row.nominal = values[static_cast<Eigen::Index>(k)];
+    rows[k].row.nominal = values[k];
   }
   return rows;
 }
@@ -131,7 +131,7 @@ Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow
     if (!best || fit.objective > best->objective) best = std::move(fit);
   }
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    double& value = best->values[static_cast<Eigen::Index>(k)];
+    double& value = best->values[k];
     value = rows[k].row.name == "marker_yaw" ? wrap_angle(value) : rows[k].row.nominal;
   }
   return best->values;
@@ -145,8 +145,8 @@ WindowFit with_delay(const WindowFitter& fitter, const WindowFit& fit) {
   if (row == fit.rows.end() || row->free) return fit;
   const auto at = row - fit.rows.begin();
   std::vector<FitRow> rows = fit.rows;
-  rows[static_cast<std::size_t>(at)].free = true;
-  rows[static_cast<std::size_t>(at)].row.tolerance = kDelay_s;
+  rows[at].free = true;
+  rows[at].row.tolerance = kDelay_s;
   Eigen::VectorXd best = fit.values;
   double most = fit.objective;
   for (double size = kShift_s; size <= kMostShift_s; size *= 1.5) {
@@ -183,7 +183,7 @@ bool explains(const WindowFitter& fitter, const WindowFit& fit) {
   }
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     if (fit.rows[k].row.key != "ratio") continue;
-    const double ratio = fit.values[static_cast<Eigen::Index>(k)];
+    const double ratio = fit.values[k];
     if (ratio < 1 / kMostRatio || ratio > kMostRatio) return false;
   }
   const Eigen::Vector3d& left = fit.scales.front();
@@ -246,12 +246,12 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
     if (fit.rows[k].row.name != "grip") continue;
     const double unsure = unsure_grip(fitter, fit, k);
     Stream stream({seed, Purpose::kStatistics, 2, 0, 0});
-    for (double& off : reference.draws.row(static_cast<Eigen::Index>(k))) {
+    for (double& off : reference.draws.row(k)) {
       off += unsure * stream.normal();
     }
   }
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-    const auto draws = reference.draws.row(static_cast<Eigen::Index>(k));
+    const auto draws = reference.draws.row(k);
     const double deviation = draws.norm() / std::sqrt(static_cast<double>(draws.size()));
     const FitRow& row = fit.rows[k];
     reference.shown.push_back(deviation > kHeld * row.row.tolerance &&
@@ -322,7 +322,7 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   fit = with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), std::move(fit));
   question.reference = reference_of(fitter, fit, seed);
   for (std::size_t k = 0; k < question.rows.size(); ++k) {
-    question.rows[k].nominal = fit.values[static_cast<Eigen::Index>(k)];
+    question.rows[k].nominal = fit.values[k];
   }
   question.catalogue = change_hypotheses(robot, question.rows);
   for (GroundHypothesis& h : question.catalogue) {
@@ -354,9 +354,8 @@ Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
     for (std::size_t k = 0; k < fit.rows.size(); ++k) {
       const KinematicRow& row = question.rows[k];
       if (!row.name.starts_with("marker_")) continue;
-      const auto i = static_cast<Eigen::Index>(k);
       const double had = value_in_file(robot, row.name);
-      settled.pose.push_back({row, had, fit.values[i], {bounds(i, 0), bounds(i, 1)}});
+      settled.pose.push_back({row, had, fit.values[k], {bounds(k, 0), bounds(k, 1)}});
     }
     break;
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/ranges.h"
+#include "common/base/try.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/report/ground_text.h"
@@ -63,12 +65,10 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
   }
   *fit = fitter.fit(rows, {}, values);
   Offer offer{index, fit->objective - search.fit.objective - hypothesis.price, {}};
-  offer.values.resize(static_cast<Eigen::Index>(hypothesis.freed.size()));
+  offer.values.resize(hypothesis.freed.size());
   for (std::size_t k = 0; k < hypothesis.freed.size(); ++k) {
-    offer.values[static_cast<Eigen::Index>(k)] =
-        fit->values[row_index(rows, hypothesis.freed[k].name)];
-    if (hypothesis.only_more && hypothesis.freed[k].nominal == 0 &&
-        offer.values[static_cast<Eigen::Index>(k)] < 0) {
+    offer.values[k] = fit->values[row_index(rows, hypothesis.freed[k].name)];
+    if (hypothesis.only_more && hypothesis.freed[k].nominal == 0 && offer.values[k] < 0) {
       offer.gain = 0;
     }
   }
@@ -80,7 +80,7 @@ bool chosen_before(const GroundSearch& search, std::size_t index) {
   // Rows of what is offered that are free already have nothing to show.
   for (const KinematicRow& row : search.catalogue[index].freed) {
     const Eigen::Index at = row_index(search.rows, row.name);
-    if (at < 0 || !search.rows[static_cast<std::size_t>(at)].free) return false;
+    if (at < 0 || !search.rows[at].free) return false;
   }
   return true;
 }
@@ -109,8 +109,7 @@ struct Candidate {
 
 Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
                            const GroundSearch& search, const Offer& offer, WindowFit fit) {
-  std::vector<std::size_t> hypotheses;
-  for (const GroundStep& step : search.steps) hypotheses.push_back(step.chosen);
+  std::vector<std::size_t> hypotheses = mapped(search.steps, &GroundStep::chosen);
   hypotheses.push_back(offer.hypothesis);
   std::vector<FitRow> rows;
   Eigen::VectorXd start;
@@ -119,7 +118,7 @@ Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Eigen::Index j = row_index(fit.rows, rows[i].row.name);
-    if (j >= 0) start[static_cast<Eigen::Index>(i)] = fit.values[j];
+    if (j >= 0) start[i] = fit.values[j];
   }
   const WindowSet& windows = fitter.windows();
   Candidate candidate{offer, std::move(fit), {}, search.chain.back(), {}, search.moved};
@@ -177,7 +176,7 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
       chosen.offer.hypothesis, chosen.offer.gain, chosen.held_out_gain, chosen.before, {}};
   const auto add = [&](std::size_t hypothesis) {
     auto& alike = step.not_distinguished;
-    const bool there = std::find(alike.begin(), alike.end(), hypothesis) != alike.end();
+    const bool there = contains(alike, hypothesis);
     if (hypothesis != step.chosen && !there) alike.push_back(hypothesis);
   };
   for (const Candidate& other : candidates) {
@@ -199,11 +198,9 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
 
 bool frees_part_of(const GroundHypothesis& part, const GroundHypothesis& whole) {
   const auto is_in_whole = [&](const KinematicRow& row) {
-    return std::any_of(whole.freed.begin(), whole.freed.end(),
-                       [&](const KinematicRow& other) { return other.name == row.name; });
+    return contains(whole.freed, row.name, &KinematicRow::name);
   };
-  return part.freed.size() < whole.freed.size() &&
-         std::all_of(part.freed.begin(), part.freed.end(), is_in_whole);
+  return part.freed.size() < whole.freed.size() && std::ranges::all_of(part.freed, is_in_whole);
 }
 
 // A candidate with some of the values of another one that gains no more over it than a model leaves
@@ -316,11 +313,11 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
   for (const KinematicRow& freed : hypothesis.freed) {
     const Eigen::Index at = row_index(rows, freed.name);
     if (at >= 0) {
-      rows[static_cast<std::size_t>(at)].free = true;
+      rows[at].free = true;
       continue;
     }
     rows.push_back({freed, true});
-    values->conservativeResize(static_cast<Eigen::Index>(rows.size()));
+    values->conservativeResize(rows.size());
     (*values)[values->size() - 1] = freed.nominal;
   }
   return rows;
@@ -363,9 +360,7 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   search.fault_gains = question.fault_gains;
   search.log = log;
   stage(kFaultStage);
-  if (Status s = search_faults(robot, settings, question, work.memo, &search); !s) {
-    return s.error();
-  }
+  RETURN_IF_ERROR(search_faults(robot, settings, question, work.memo, &search));
   emit_faults(work, search);
   const WindowFitter fitter(robot, search.windows,
                             question.reference ? &*question.reference : nullptr, work.memo);

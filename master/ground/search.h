@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,7 +50,6 @@ struct SensorValue {
   Interval interval;  // 90 %
 };
 
-// What a search is about.
 struct GroundQuestion {
   std::vector<KinematicRow> rows;
   std::vector<GroundHypothesis> catalogue;

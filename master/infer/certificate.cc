@@ -1,7 +1,6 @@
 #include "master/infer/certificate.h"
 
 #include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
 
 #include "common/math/algebra.h"

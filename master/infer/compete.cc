@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/try.h"
 #include "master/infer/scope.h"
-#include "master/infer/settings.h"
 
 namespace gapfarm::infer {
 namespace {
@@ -60,10 +60,9 @@ Result<std::vector<Anchor>> Search::anchors(const Eigen::VectorXd& base,
   const Fitter fits = fitter(base_);
   std::vector<Eigen::VectorXd> points = {base};
   for (const Overrides& other : others) points.push_back(base_.from(other));
-  auto at = fits.starts(points, std::vector<Space>(points.size(), base_));
-  if (!at) return at.error();
+  ASSIGN_OR_RETURN(auto at, fits.starts(points, std::vector<Space>(points.size(), base_)));
   std::vector<Anchor> anchors;
-  for (Fit& fit : *at) {
+  for (Fit& fit : at) {
     if (!std::isfinite(fit.score)) continue;
     if (Status s = fits.differentiate(&fit); !s) return s.error();
     anchors.push_back(std::move(fit));
@@ -100,8 +99,7 @@ Result<std::vector<Runner>> Search::at_starts(std::size_t hypothesis, const Anch
     // Of the base's parameters the anchor's slopes will do until a step shows that they do not.
     runner.fit.slopes = anchor.slopes;
     runner.fit.differences = anchor.differences;
-    if (Status s = fitter(runner.space).differentiate(&runner.fit, anchor.u.size()); !s)
-      return s.error();
+    RETURN_IF_ERROR(fitter(runner.space).differentiate(&runner.fit, anchor.u.size()));
     runner.fit.fresh = false;
   }
   return runners;
@@ -118,8 +116,7 @@ Result<Fit> Search::from_neutral(const Hypothesis& h, const Fitter& fitter,
 }
 
 const Anchor& best_of(const std::vector<Anchor>& anchors) {
-  return *std::max_element(anchors.begin(), anchors.end(),
-                           [](const Anchor& a, const Anchor& b) { return a.score < b.score; });
+  return *std::ranges::max_element(anchors, {}, &Anchor::score);
 }
 
 Result<std::vector<Runner>> Search::line_up(const std::vector<Anchor>& anchors,
@@ -135,9 +132,8 @@ Result<std::vector<Runner>> Search::line_up(const std::vector<Anchor>& anchors,
       const bool best = &anchor == &best_of(anchors);
       if (!h.starts.empty() && (best || h.starts.size() <= kFewStarts) &&
           (everywhere || !h.from_neutral)) {
-        auto at = at_starts(k, anchor);
-        if (!at) return at.error();
-        for (Runner& runner : *at) runners.push_back(std::move(runner));
+        ASSIGN_OR_RETURN(auto at, at_starts(k, anchor));
+        for (Runner& runner : at) runners.push_back(std::move(runner));
       }
       if (!h.from_neutral) continue;
       auto neutral = from_neutral(h, fits, anchor);
@@ -187,9 +183,7 @@ std::vector<Runner> best_of_each(std::vector<Runner> runners, std::size_t most,
                                  std::ptrdiff_t of_each) {
   std::vector<Runner> best;
   for (Runner& runner : runners) {
-    const auto there = std::count_if(best.begin(), best.end(), [&](const Runner& b) {
-      return b.hypothesis == runner.hypothesis;
-    });
+    const auto there = std::ranges::count(best, runner.hypothesis, &Runner::hypothesis);
     if (there < of_each && best.size() < most) best.push_back(std::move(runner));
   }
   return best;
@@ -242,9 +236,8 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
   const Scope some = scope_of(forward, observations, every(half ? 2 : 1, observations.size()));
   const Scope all = scope_of(forward, observations, every(1, observations.size()));
   const Search first(some, base.space, hypotheses), whole(all, base.space, hypotheses);
-  const auto anchors = first.anchors(base.fit.u, terms.bases);
-  if (!anchors) return anchors.error();
-  auto runners = first.line_up(*anchors, terms);
+  ASSIGN_OR_RETURN(const auto anchors, first.anchors(base.fit.u, terms.bases));
+  auto runners = first.line_up(anchors, terms);
   if (!runners) return runners.error();
   const std::size_t most = terms.effort == Effort::kGlobal ? kLeaders : kFinalists;
   for (;;) {
@@ -277,8 +270,7 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
                hypotheses[leader.hypothesis].luck;
     contest.contenders.push_back({leader.hypothesis, std::move(*model), gain.sum, gain.se});
   }
-  std::stable_sort(contest.contenders.begin(), contest.contenders.end(),
-                   [](const Contender& a, const Contender& b) { return a.gain > b.gain; });
+  std::ranges::stable_sort(contest.contenders, std::ranges::greater{}, &Contender::gain);
   // Nothing distinguishes those within what is no progress of a fit.
   const auto equal = std::partition_point(
       contest.contenders.begin(), contest.contenders.end(),

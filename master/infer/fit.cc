@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "common/math/algebra.h"
-#include "master/infer/settings.h"
 
 namespace gapfarm::infer {
 namespace {
@@ -267,8 +266,7 @@ Status Fitter::improve(Fit* fit, int steps) const {
 
 std::vector<double> Fitter::held_out(const Fit& fit) const {
   std::vector<double> scores(observations_.size(), 0.0);
-  const std::size_t folds =
-      1 + *std::max_element(observations_.fold.begin(), observations_.fold.end());
+  const std::size_t folds = 1 + *std::ranges::max_element(observations_.fold);
   for (std::size_t f = 0; f < folds; ++f) {
     const Normal equations = normal(fit, f);
     const Eigen::VectorXd delta =

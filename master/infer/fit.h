@@ -68,7 +68,6 @@ class Fitter {
                                   const std::vector<Space>& spaces,
                                   const std::vector<std::vector<std::uint32_t>>& reach = {},
                                   const Eigen::VectorXd& elsewhere = {}) const;
-  // What the next step promises to gain, nats.  REQUIRES: slopes.
   double promise(const Fit& fit) const;
   // Steps uphill, at most so many.
   Status improve(Fit* fit, int steps) const;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <numeric>
 #include <set>
-#include <tuple>
 
 #include "common/math/digits.h"
 #include "common/score/motion_model.h"
@@ -15,11 +14,7 @@ constexpr std::size_t kTasks = 80;  // of a batch: enough for eight workers to e
 constexpr std::size_t kMostParts = 16;
 
 void fill(const Overrides& at, v1::Point* point) {
-  for (const auto& [row, value] : at) {
-    v1::Override* to = point->add_overrides();
-    to->set_parameter(static_cast<std::uint32_t>(row));
-    to->set_value(value);
-  }
+  for (const auto& [row, value] : at) *point->add_overrides() = override_of(row, value);
 }
 
 v1::Task task_of(const Overrides& at, const std::vector<std::uint32_t>& trials, bool means_only,

@@ -24,8 +24,7 @@ Scope scope_of(const Forward& forward, const Observations& whole,
     some.observations.whitener.push_back(whole.whitener[i]);
     some.observations.fold.push_back(whole.fold[i]);
     if (columns == 0) continue;
-    some.observations.columns.middleRows<3>(static_cast<Eigen::Index>(3 * k)) =
-        whole.columns.middleRows<3>(static_cast<Eigen::Index>(3 * i));
+    some.observations.columns.middleRows<3>(3 * k) = whole.columns.middleRows<3>(3 * i);
   }
   some.forward = [&forward, index = some.index](const std::vector<PredictionRequest>& points) {
     std::vector<PredictionRequest> counted = points;

@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <nlohmann/json.hpp>
-#include <span>
 
 #include "common/json/json.h"
 #include "master/report/html.h"
@@ -90,7 +89,7 @@ std::string top(const PageFrame& frame) {
       html_escaped(frame.brand), links);
 }
 
-std::string data_block(const char* id, const nlohmann::ordered_json& json) {
+std::string data_block(const char* id, const Json& json) {
   return fmt::format("<script type=\"application/json\" id=\"{}\">{}</script>\n", id,
                      script_safe(json_text(json)));
 }
@@ -185,8 +184,7 @@ std::string watch_section(std::string_view what) {
          kNoScript + "</section>\n";
 }
 
-std::string framed_page(const PageFrame& frame, const nlohmann::ordered_json& page,
-                        const nlohmann::ordered_json& trials) {
+std::string framed_page(const PageFrame& frame, const Json& page, const Json& trials) {
   std::string html =
       head(frame) + "<body>\n" + kHatches + top(frame) + "<main>\n" + frame.body +
       (frame.served

@@ -1,12 +1,13 @@
 // What the program's pages have in common: policy, styles, scripts, data, navigation.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "common/json/json.h"
 
 namespace gapfarm {
 
@@ -21,8 +22,7 @@ struct PageFrame {
 
 // One self-contained file, UTF-8: no network, its own scripts and styles only, named by their
 // hashes in its content security policy.  `page` and `trials` are the data of its plots.
-std::string framed_page(const PageFrame& frame, const nlohmann::ordered_json& page,
-                        const nlohmann::ordered_json& trials);
+std::string framed_page(const PageFrame& frame, const Json& page, const Json& trials);
 
 // A key to the marks of the plots: `items` are <li> elements.
 std::string plot_key(std::string_view items);

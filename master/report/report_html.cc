@@ -17,8 +17,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr const char* kDrivenEnds =
     R"(One picture a command, seen from where each trial began; turns on the spot by their headings, a row a condition. An ellipse or a bar should hold nine trials in ten. As driven, there is one a condition, so a model that looks at more than the command spreads its predictions; an error takes each trial's own prediction away.)";
 constexpr const char* kDrivenResiduals =
@@ -94,45 +92,22 @@ constexpr std::array<GapUnit, 3> kUnits = {GapUnit::kNats, GapUnit::kMillimetres
 constexpr double kLeastScaleNats = 0.2;
 constexpr int kHatchCount = 5;  // as many as the page defines
 
-const GapFigures& figures(const Diagnosis& diagnosis, GapUnit unit) {
-  switch (unit) {
-    case GapUnit::kNats:
-      return diagnosis.gap;
-    case GapUnit::kMillimetres:
-      return diagnosis.position_mm;
-    case GapUnit::kMilliradians:
-      return diagnosis.heading_mrad;
-  }
-  return diagnosis.gap;
-}
-
-std::optional<double> level_after(const NamedEffect& effect, GapUnit unit) {
-  switch (unit) {
-    case GapUnit::kNats:
-      return effect.gap_after;
-    case GapUnit::kMillimetres:
-      return effect.position_mm_after;
-    case GapUnit::kMilliradians:
-      return effect.heading_mrad_after;
-  }
-  return std::nullopt;
-}
-
-struct UnitLabels {
+// In the order of GapUnit.
+struct UnitRow {
   const char* title;
   const char* unit;
+  GapFigures Diagnosis::*figures;
 };
+constexpr UnitRow kUnitRows[] = {{"Log score lost a trial", "nats", &Diagnosis::gap},
+                                 {"Position, root mean square", "mm", &Diagnosis::position_mm},
+                                 {"Heading, root mean square", "mrad", &Diagnosis::heading_mrad}};
 
-UnitLabels labels_of(GapUnit unit) {
-  switch (unit) {
-    case GapUnit::kNats:
-      return {"Log score lost a trial", "nats"};
-    case GapUnit::kMillimetres:
-      return {"Position, root mean square", "mm"};
-    case GapUnit::kMilliradians:
-      return {"Heading, root mean square", "mrad"};
-  }
-  return {"", ""};
+const UnitRow& row_of(GapUnit unit) { return kUnitRows[static_cast<std::size_t>(unit)]; }
+
+std::optional<double> level_after(const NamedEffect& effect, GapUnit unit) {
+  return unit == GapUnit::kNats          ? effect.gap_after
+         : unit == GapUnit::kMillimetres ? effect.position_mm_after
+                                         : effect.heading_mrad_after;
 }
 
 // Class and badge of a part; effects count from 1.
@@ -226,7 +201,7 @@ std::string bars(const GapSplit& split) {
   // A gap of next to nothing shall not fill the bar.
   const double least = split.unit == GapUnit::kNats ? kLeastScaleNats : 0;
   const double scale = std::max({drawn_total(split, true), drawn_total(split, false), least});
-  const UnitLabels w = labels_of(split.unit);
+  const UnitRow& w = row_of(split.unit);
   return fmt::format(
       R"(<div class="split"><h3>{}</h3>)"
       R"(<div class="split-row"><span class="split-name">before</span>{}<span class="split-value">{} {}</span></div>)"
@@ -344,7 +319,7 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
 }
 
 GapSplit split_gap(const Diagnosis& diagnosis, GapUnit unit) {
-  const GapFigures& f = figures(diagnosis, unit);
+  const GapFigures& f = diagnosis.*row_of(unit).figures;
   GapSplit split{unit, f.tuned, f.final_, {}};
   split.parts.push_back({GapPart::Kind::kFloor, "floor (repeats of a trial)", f.floor});
   split.parts.push_back({GapPart::Kind::kUnexplained, "unexplained", f.final_ - f.floor});

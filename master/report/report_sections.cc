@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 
@@ -136,15 +137,14 @@ std::string effect_card(const NamedEffect& effect, std::size_t number) {
 }
 
 bool is_named(const Diagnosis& diagnosis, const std::string& effect) {
-  return std::any_of(diagnosis.effects.begin(), diagnosis.effects.end(),
-                     [&](const NamedEffect& e) { return e.name == effect; });
+  return contains(diagnosis.effects, effect, &NamedEffect::name);
 }
 
 // "◆ named", "◇ instead of floor_tilt", or nothing.
 std::string standing(const Diagnosis& diagnosis, const std::string& effect) {
   for (const NamedEffect& e : diagnosis.effects) {
     if (e.name == effect) return R"( <span class="tag">◆ named</span>)";
-    if (std::find(e.aliases.begin(), e.aliases.end(), effect) != e.aliases.end()) {
+    if (contains(e.aliases, effect)) {
       return R"( <span class="tag">◇ or instead of )" + html_escaped(e.name) + "</span>";
     }
   }
@@ -253,8 +253,7 @@ std::string screening_section(const Diagnosis& diagnosis) {
   }
   // A gain that is not a number sorts last, so that the comparison stays an order.
   const auto key = [](const Screened* s) { return std::isfinite(s->gain) ? s->gain : -1e300; };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](const auto* a, const auto* b) { return key(a) > key(b); });
+  std::ranges::stable_sort(order, [&](const auto* a, const auto* b) { return key(a) > key(b); });
   std::vector<HtmlRow> rows;
   for (const Screened* s : order) rows.push_back(screened_row(diagnosis, *s, largest));
   return R"(<section id="screening"><h2>Which effect: the whole catalogue</h2><p>What each effect could add to the )"

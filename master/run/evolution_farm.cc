@@ -3,6 +3,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/problem/question.h"
 #include "common/progress/number_text.h"
@@ -239,10 +240,8 @@ FarmBackend::FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed,
 }
 
 std::vector<v1::Task> FarmBackend::tasks_of(std::span<const Candidate> candidates) const {
-  std::vector<v1::Task> tasks;
-  for (const Candidate& candidate : candidates) {
-    tasks.push_back(evaluation_task(candidate, seed_));
-  }
+  std::vector<v1::Task> tasks = mapped(
+      candidates, [&](const Candidate& candidate) { return evaluation_task(candidate, seed_); });
   return tasks;
 }
 

@@ -11,7 +11,6 @@
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"
-#include "master/evolve/evolve.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"

@@ -15,7 +15,6 @@
 #include "master/report/html.h"
 #include "master/run/run_sample.h"
 #include "master/store/run_lock.h"
-#include "master/store/run_reader.h"
 
 namespace gapfarm {
 namespace {
@@ -369,14 +368,7 @@ Status add_farm(const RunReader& reader, RunReport* report) {
   }
   ASSIGN_OR_RETURN(const auto lost, reader.given_up(kMostGivenUp));
   for (const RunReader::Member& member : lost) {
-    const StoredIndividual& one = member.individual;
-    farm.given_up.push_back({one.birth_id,
-                             member.generation,
-                             one.fitness,
-                             one.outcome,
-                             one.operators,
-                             one.parents,
-                             {}});
+    farm.given_up.push_back(genome_of_member(member));
   }
   farm.log = log_tail(reader.run());
   return {};

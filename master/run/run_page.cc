@@ -15,10 +15,8 @@
 #include "common/config/stages.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
-#include "common/trials/context.h"
 #include "common/trials/files.h"
 #include "master/report/figures/line_chart.h"
-#include "master/report/figures/pose_picture.h"
 #include "master/report/html.h"
 #include "master/report/prediction_table.h"
 #include "master/run/baseline_notes.h"
@@ -222,11 +220,7 @@ Status write_page(const RunStore& store) {
 
 RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
                        const PredictionOfLog* after, const std::vector<Validated>& validated) {
-  std::vector<DrivenCommand> driven;
-  for (const Trial& trial : problem.log.trials) {
-    const CommandSpec c = resolved_command(trial, problem.commands);
-    driven.push_back({c.left, c.right, c.duration_s});
-  }
+  const std::vector<DrivenCommand> driven = driven_commands(problem.log, problem.commands);
   const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
   RunOutcome outcome;
   for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {

@@ -13,7 +13,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Ours = EvolutionOverrides;
 using Theirs = EvolutionSettings;
 

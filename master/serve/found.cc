@@ -7,7 +7,6 @@
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
 #include "master/store/run_reader.h"
-#include "master/store/schema.h"
 
 namespace gapfarm {
 namespace {

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <string>
 
+#include "common/base/text.h"
 #include "master/serve/pages.h"
 
 namespace gapfarm {
@@ -57,9 +58,7 @@ constexpr MetricRow kMetricRows[] = {
 std::string number_of_metric(double value) {
   if (std::isnan(value)) return "NaN";
   if (std::isinf(value)) return value > 0 ? "+Inf" : "-Inf";
-  std::array<char, 32> text;
-  std::snprintf(text.data(), text.size(), "%.17g", value);
-  return text.data();
+  return formatted("%.17g", value);
 }
 
 void add_optional(const std::vector<WorkEntry>& entries, const char* name, const char* help,

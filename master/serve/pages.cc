@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "common/base/ranges.h"
 #include "common/progress/number_text.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
@@ -17,8 +18,6 @@
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // The best by generation, worst tenth omitted from its scale.
 std::string spark(const std::vector<double>& values) {
@@ -154,8 +153,7 @@ std::string comparison_table(std::span<const RunReport> runs) {
   std::vector<const ParameterRow*> keys;
   for (const RunReport& run : runs) {
     for (const ParameterRow& row : run.parameters) {
-      const bool there = std::any_of(keys.begin(), keys.end(),
-                                     [&](const ParameterRow* k) { return k->key == row.key; });
+      const bool there = contains(keys, row.key, &ParameterRow::key);
       if (!there) keys.push_back(&row);
     }
   }
@@ -169,8 +167,7 @@ std::string comparison_table(std::span<const RunReport> runs) {
     html += R"(<tr><th scope="row"><code>)" + html_escaped(key->key) + "</code> <small>" +
             html_escaped(key->unit == "-" ? "" : key->unit) + "</small></th>";
     for (const RunReport& run : runs) {
-      const auto row = std::find_if(run.parameters.begin(), run.parameters.end(),
-                                    [&](const ParameterRow& r) { return r.key == key->key; });
+      const auto row = std::ranges::find(run.parameters, key->key, &ParameterRow::key);
       std::string value = "–";
       if (row != run.parameters.end()) {
         value = row->choice.empty() ? number_text(row->after, 4) : html_escaped(row->choice);
@@ -198,8 +195,7 @@ std::string utc_text(double unix_s) {
 std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
                       const std::vector<std::string>& folders) {
   const std::size_t all = entries.size();
-  const auto running = std::count_if(entries.begin(), entries.end(),
-                                     [](const WorkEntry& e) { return e.state == "running"; });
+  const auto running = std::ranges::count(entries, "running", &WorkEntry::state);
   std::erase_if(entries, [&](const WorkEntry& e) { return !is_wanted(e, view); });
   sort_entries(&entries, view.sort);
   PageFrame frame;
@@ -277,12 +273,12 @@ std::string compare_page(std::span<const RunReport> runs) {
   return framed_page(frame, page, no_trials_json());
 }
 
-nlohmann::ordered_json plain_page_json() {
-  return {{"models", nlohmann::ordered_json::object()}, {"served", true}, {"without_trials", ""}};
+Json plain_page_json() {
+  return {{"models", Json::object()}, {"served", true}, {"without_trials", ""}};
 }
 
-nlohmann::ordered_json no_trials_json() {
-  const auto none = nlohmann::ordered_json::array();
+Json no_trials_json() {
+  const auto none = Json::array();
   return {{"columns", none}, {"rows", none}};
 }
 

@@ -1,12 +1,12 @@
 // The pages that a server makes by itself.  The others are those that commands write.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 #include "master/report/run/run_report.h"
 #include "master/serve/found.h"
 
@@ -38,8 +38,8 @@ std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_
 std::string utc_text(double unix_s);
 
 // The data of a page that has no plots, and of one without trials.
-nlohmann::ordered_json plain_page_json();
-nlohmann::ordered_json no_trials_json();
+Json plain_page_json();
+Json no_trials_json();
 
 // Where rows become cards, on a narrow screen, cells without content are omitted.
 std::string list_cell(const char* label, const std::string& html, bool is_number = false);

@@ -81,8 +81,7 @@ void Site::look() {
 }
 
 const FoundWork* Site::find(const std::string& name) const {
-  const auto found = std::find_if(found_.begin(), found_.end(),
-                                  [&](const FoundWork& f) { return f.name == name; });
+  const auto found = std::ranges::find(found_, name, &FoundWork::name);
   return found == found_.end() ? nullptr : &*found;
 }
 

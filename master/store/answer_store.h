@@ -94,8 +94,7 @@ class RecordedFarm : public Farm {
   RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers = nullptr);
   RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers, Clock clock);
   ~RecordedFarm() override;
-  RecordedFarm(const RecordedFarm&) = delete;
-  RecordedFarm& operator=(const RecordedFarm&) = delete;
+  RecordedFarm& operator=(RecordedFarm&&) = delete;
 
   // Written beside the answers from now on.
   void set_stage(std::string stage) { stage_ = std::move(stage); }

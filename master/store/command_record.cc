@@ -13,66 +13,42 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 // Commands beat about once a second, less often while they compute themselves.
 constexpr double kFreshRecord_s = 120;
 
 // Every object of the record, in the order of its fields.
-constexpr auto kStage = [](auto& v, auto& stage) {
-  v.field("name", stage.name);
-  v.field("began", stage.began_unix_s);
+constexpr auto kStage = [](auto& v, auto& row) {
+  FIELDS(name);
+  v.field("began", row.began_unix_s);
 };
 constexpr auto kStageFinding = [](auto& v, auto& row) {
-  v.field("stage", row.stage);
+  FIELDS(stage);
   v.field("about", row.found.about);
   v.field("text", row.found.text);
   v.field("columns", row.found.columns);
   v.field("rows", row.found.rows);
 };
-constexpr auto kWorker = [](auto& v, auto& worker) {
-  v.field("name", worker.name);
-  v.field("state", worker.state);
-  v.field("jobs", worker.jobs);
-  v.field("host", worker.host);
-  v.field("finished", worker.finished);
-  v.field("rate_per_s", worker.rate_per_s);
+constexpr auto kWorker = [](auto& v, auto& row) {
+  FIELDS(name, state, jobs, host, finished, rate_per_s);
 };
-constexpr auto kFleet = [](auto& v, auto& fleet) {
-  v.field("name", fleet.name);
-  v.field("system", fleet.system);
-  v.field("host", fleet.host);
-  v.field("asked", fleet.wanted);
-  v.field("queued", fleet.queued);
-  v.field("running", fleet.running);
-  v.field("lost", fleet.lost);
-  v.field("why", fleet.why);
+constexpr auto kFleet = [](auto& v, auto& row) {
+  FIELDS(name, system, host);
+  v.field("asked", row.wanted);
+  FIELDS(queued, running, lost, why);
 };
-constexpr auto kRecord = [](auto& v, auto& record) {
-  v.field("command", record.command);
-  v.field("state", record.state);
-  v.field("stop_reason", record.reason);
-  v.field("stage", record.stage);
-  v.field("stage_number", record.stage_number);
-  v.field("stages", record.stages);
-  v.list("plan", record.plan, kStage);
-  v.list("findings", record.findings, kStageFinding);
-  v.field("done", record.done);
-  v.field("total", record.total);
-  v.field("share", record.share);
-  v.field("rate_per_s", record.rate_per_s);
-  v.field("time_left_s", record.time_left_s);
-  v.field("remembered", record.remembered);
-  v.field("simulated", record.simulated);
-  v.field("waiting", record.waiting);
-  v.list("workers", record.workers, kWorker);
-  v.list("fleets", record.fleets, kFleet);
-  v.field("listen", record.listen);
-  v.field("began", record.began_unix_s);
-  v.field("heartbeat", record.heartbeat_unix_s);
-  v.field("pid", record.pid);
-  v.field("host", record.host);
-  v.field("arguments", record.arguments);
+constexpr auto kRecord = [](auto& v, auto& row) {
+  FIELDS(command, state);
+  v.field("stop_reason", row.reason);
+  FIELDS(stage, stage_number, stages);
+  v.list("plan", row.plan, kStage);
+  v.list("findings", row.findings, kStageFinding);
+  FIELDS(done, total, share, rate_per_s, time_left_s, remembered, simulated, waiting);
+  v.list("workers", row.workers, kWorker);
+  v.list("fleets", row.fleets, kFleet);
+  FIELDS(listen);
+  v.field("began", row.began_unix_s);
+  v.field("heartbeat", row.heartbeat_unix_s);
+  FIELDS(pid, host, arguments);
 };
 
 bool lives(const std::filesystem::path& folder, const CommandRecord& record, double now_unix_s) {

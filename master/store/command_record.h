@@ -4,12 +4,12 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 #include "common/progress/finding.h"
 #include "master/store/records.h"
 
@@ -53,9 +53,9 @@ struct CommandRecord {
   std::string host;
 };
 
-nlohmann::ordered_json to_json(const CommandRecord& record);
+Json to_json(const CommandRecord& record);
 // Fields that are missing or of another kind are left as they are by default.
-CommandRecord command_record_of(const nlohmann::ordered_json& json);
+CommandRecord command_record_of(const Json& json);
 
 // What the command in `folder` last reported; one that says it runs but whose process is gone has
 // stopped, with the reason.  None: the folder holds no command.  Errors: of reading its file.

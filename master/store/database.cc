@@ -5,8 +5,6 @@
 #include <atomic>
 #include <cstring>
 
-#include "common/base/try.h"
-
 namespace gapfarm {
 namespace {
 

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/try.h"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -135,9 +135,8 @@ class Database {
     statement->bind_all(values...);
     std::vector<std::invoke_result_t<Read, const SqlStatement&>> all;
     for (;;) {
-      const Result<bool> row = statement->step();
-      if (!row) return row.error();
-      if (!*row) return all;
+      ASSIGN_OR_RETURN(const auto row, statement->step());
+      if (!row) return all;
       all.push_back(read(*statement));
     }
   }
@@ -149,9 +148,8 @@ class Database {
     using Row = std::optional<std::invoke_result_t<Read, const SqlStatement&>>;
     Result<SqlStatement> statement = prepare(sql, operation);
     if (!statement) return statement.error();
-    const Result<bool> there = statement->bind_all(values...).step();
-    if (!there) return there.error();
-    return *there ? Row(read(*statement)) : Row();
+    ASSIGN_OR_RETURN(const auto there, statement->bind_all(values...).step());
+    return there ? Row(read(*statement)) : Row();
   }
   // The only value of a statement's only row.
   Result<std::int64_t> integer(const std::string& sql, const std::string& operation) const;

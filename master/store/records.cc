@@ -12,15 +12,8 @@
 namespace gapfarm {
 
 const char* run_state_name(RunState state) {
-  switch (state) {
-    case RunState::kRunning:
-      return "running";
-    case RunState::kFinished:
-      return "finished";
-    case RunState::kStopped:
-      return "stopped";
-  }
-  return "stopped";
+  constexpr const char* kNames[] = {"running", "finished", "stopped"};
+  return kNames[static_cast<std::size_t>(state)];
 }
 
 const std::array<FarmTally::Row, 13> FarmTally::kRows = {{
@@ -46,7 +39,7 @@ FarmTally& FarmTally::operator+=(const FarmTally& other) {
 
 std::string FarmTally::to_json(const std::vector<FleetStatus>& fleets,
                                const std::string& listen) const {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  Json json = Json::object();
   for (const Row& row : kRows) json[row.key] = this->*row.count;
   if (!listen.empty()) json["listen"] = listen;
   if (!fleets.empty()) json["fleets"] = fleets_json(fleets);
@@ -71,7 +64,7 @@ void FarmTally::read_farm(const std::string& text, Progress* progress) {
   const auto json = parse_json(text);
   if (!json.is_object()) return;
   LenientFields(json).field("listen", progress->listen);
-  progress->fleets = fleets_of(json.value("fleets", nlohmann::ordered_json()));
+  progress->fleets = fleets_of(json.value("fleets", Json()));
 }
 
 const char* incident_name(IncidentKind kind) {
@@ -82,7 +75,7 @@ const char* incident_name(IncidentKind kind) {
 std::string readable_values(const Problem& problem, const Genome& genome) {
   const ParameterTable& table = problem.table();
   const ParameterValues values = problem.values_of(genome);
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  Json json = Json::object();
   for (const Gene& gene : problem.genes) {
     const Parameter& row = table[gene.row];
     const double value = values[gene.row];

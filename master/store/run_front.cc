@@ -10,8 +10,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 // Members that ended well, with their objectives.
 std::vector<StoredIndividual> complete(std::vector<StoredIndividual> members,
                                        std::size_t objectives) {
@@ -69,10 +67,9 @@ Result<RunFront> run_front(const RunReader& reader,
   if (last.empty()) return front;
   const std::uint64_t best = last.front().birth_id;
   for (const std::size_t i : first_front(all_costs(front, last))) front.members.push_back(last[i]);
-  std::stable_sort(front.members.begin(), front.members.end(),
-                   [](const StoredIndividual& a, const StoredIndividual& b) {
-                     return a.objectives.front().second < b.objectives.front().second;
-                   });
+  std::ranges::stable_sort(front.members, [](const StoredIndividual& a, const StoredIndividual& b) {
+    return a.objectives.front().second < b.objectives.front().second;
+  });
   for (std::size_t i = 0; i < front.members.size(); ++i) {
     if (front.members[i].birth_id == best) front.knee = i;
   }

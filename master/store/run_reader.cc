@@ -13,8 +13,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr std::int64_t kSchemaWithIncidents = 2;
 constexpr std::int64_t kSchemaWithDocuments = 3;
 constexpr std::int64_t kSchemaWithWorkerEvents = 4;
@@ -65,8 +63,6 @@ StoredGeneration generation_of(const SqlStatement& row) {
   }
   return g;
 }
-
-using Json = nlohmann::ordered_json;
 
 // Masters beat about once a second; thirty missed ones are more than a slow disk.
 constexpr double kFreshHeartbeat_s = 30;

@@ -3,12 +3,12 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 #include "master/store/database.h"
 #include "master/store/records.h"
 
@@ -79,7 +79,7 @@ struct RunFront {
 };
 Result<RunFront> run_front(const RunReader& reader,
                            const std::vector<StoredGeneration>& generations);
-nlohmann::ordered_json to_json(const RunFront& front);
+Json to_json(const RunFront& front);
 
 struct RunStatus {
   RunState state = RunState::kStopped;
@@ -111,11 +111,11 @@ nlohmann::ordered_json search_start(const RunInfo& info);
 std::string search_start_text(const RunInfo& info);
 
 // docs/formats.md, "Status".
-nlohmann::ordered_json workers_json(const std::vector<StoredWorker>& workers);
+Json workers_json(const std::vector<StoredWorker>& workers);
 // What was written by hand or damaged reads as empty.
-std::vector<StoredWorker> workers_of(const nlohmann::ordered_json& json);
-nlohmann::ordered_json fleets_json(const std::vector<FleetStatus>& fleets);
-std::vector<FleetStatus> fleets_of(const nlohmann::ordered_json& json);
-nlohmann::ordered_json to_json(const RunStatus& status);
+std::vector<StoredWorker> workers_of(const Json& json);
+Json fleets_json(const std::vector<FleetStatus>& fleets);
+std::vector<FleetStatus> fleets_of(const Json& json);
+Json to_json(const RunStatus& status);
 
 }  // namespace gapfarm

@@ -1,5 +1,5 @@
 // Bags: no crash, errors with places, what is read has whole rows and can be imported.
-#include "master/io/logs/bags.h"
+#include "tests/fuzz/memory_source.h"
 #include "tests/fuzz/recording_promises.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

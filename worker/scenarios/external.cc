@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <string>
@@ -29,9 +28,8 @@ class ExternalVehicle final : public Vehicle {
   ExternalVehicle(const Problem& problem, const ParameterValues& values, StepCounter* steps)
       : problem_(problem), simulator_(shared_simulator(problem.external->command)), steps_(steps) {
     request_.declaration = &problem.external->table.declaration();
-    request_.values.assign(
-        values.begin(),
-        values.begin() + static_cast<std::ptrdiff_t>(request_.declaration->parameters.size()));
+    request_.values.assign(values.begin(),
+                           values.begin() + request_.declaration->parameters.size());
   }
 
   Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
@@ -86,8 +84,7 @@ class ExternalRuns final : public WindowModel {
     const ExternalDeclaration& declaration = problem_.external->table.declaration();
     ExternalRunRequest request;
     request.declaration = &declaration;
-    request.values.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(
-                                                               declaration.parameters.size()));
+    request.values.assign(values.begin(), values.begin() + declaration.parameters.size());
     const double delay_s = at(values, "delay");
     std::vector<double> gains, offsets;
     for (const std::string& channel : declaration.channels) {

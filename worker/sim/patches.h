@@ -55,8 +55,7 @@ class PatchRobot {
   // `steps` (may be null) outlives the robot.
   explicit PatchRobot(const PatchSettings& settings, StepCounter* steps = nullptr);
   ~PatchRobot();
-  PatchRobot(const PatchRobot&) = delete;
-  PatchRobot& operator=(const PatchRobot&) = delete;
+  PatchRobot& operator=(PatchRobot&&) = delete;
 
   // At the origin of the start frame, heading along x, moving like this.
   void reset(const BodyTwist& twist = {});

@@ -1,7 +1,6 @@
 #include "worker/sim/racquetball.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 
@@ -82,8 +81,7 @@ class Court {
       world_.removeCollisionObject(world_.getCollisionObjectArray()[i]);
     }
   }
-  Court(const Court&) = delete;
-  Court& operator=(const Court&) = delete;
+  Court& operator=(Court&&) = delete;
 
   Eigen::Vector3d position() const {
     const btVector3& p = ball_->getWorldTransform().getOrigin();

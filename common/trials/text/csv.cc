@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/pose/pose.h"
 #include "common/trials/dialect.h"
 
@@ -258,9 +259,7 @@ std::string format_double(double value) {
 namespace {
 
 std::string listed_names(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + quoted_word(name);
-  return text;
+  return joined(names, ", ", quoted_word);
 }
 
 // `names`: of the row's columns.

@@ -1,13 +1,9 @@
 #include "common/trials/text/trial_parser.h"
 
 #include <algorithm>
-#include <map>
-#include <utility>
 
 #include "common/base/suggest.h"
-#include "common/trials/format.h"
 #include "common/trials/text/columns.h"
-#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -1,7 +1,6 @@
 // One row a trial, whatever the log is called: internal to common/trials.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/result.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/text/mistakes.h"

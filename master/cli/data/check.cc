@@ -5,9 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
-#include "common/trials/context.h"
+#include "common/score/motion_model.h"
 #include "master/cli/data/idle_genes.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
@@ -23,8 +25,6 @@
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct CheckOptions {
   std::string config;
@@ -64,10 +64,8 @@ Status measure_evaluation(const Config& config, CliContext& context, Summary* su
   v1::Task task;
   task.mutable_predict()->set_means_only(true);
   ASSIGN_OR_RETURN(const auto predicted, farm->run(hash, {task}));
-  std::vector<Pose> ends;
-  for (const v1::Predicted& p : predicted.front().predict().predictions()) {
-    ends.push_back(from_proto(p.end()));
-  }
+  std::vector<Pose> ends = mapped(predicted.front().predict().predictions(),
+                                  [](const v1::Predicted& p) { return from_proto(p.end()); });
   check_windows(config.problem.log, ends, &summary->sanity);
   return {};
 }
@@ -98,9 +96,8 @@ std::vector<std::size_t> enabled_effects(const Problem& problem) {
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     const std::size_t first = table.effect_row(e);
     const std::size_t past = first + table.effects()[e].parameters.size();
-    const bool searched =
-        std::any_of(problem.genes.begin(), problem.genes.end(),
-                    [&](const Gene& gene) { return gene.row >= first && gene.row < past; });
+    const bool searched = std::ranges::any_of(
+        problem.genes, [&](const Gene& gene) { return gene.row >= first && gene.row < past; });
     if (searched || !table.is_neutral(e, problem.values)) enabled.push_back(e);
   }
   return enabled;
@@ -109,20 +106,14 @@ std::vector<std::size_t> enabled_effects(const Problem& problem) {
 std::size_t piece_of(const Problem& problem, const Trial& trial) {
   const auto& pieces = problem.pieces;
   return static_cast<std::size_t>(
-      std::find_if(pieces.begin(), pieces.end(),
-                   [&](const auto& piece) { return piece.name == trial.command; }) -
+      std::ranges::find_if(pieces, [&](const auto& piece) { return piece.name == trial.command; }) -
       pieces.begin());
 }
 
 // Trials that differ in nothing that the enabled effects look at share one condition.
 std::size_t count_conditions(const Problem& problem, unsigned context) {
   if (problem.windows()) return problem.runs.size();
-  std::vector<DrivenCommand> driven;
-  for (const Trial& trial : problem.log.trials) {
-    const CommandSpec& spec = problem.command(trial.command);
-    driven.push_back({trial.left.value_or(spec.left), trial.right.value_or(spec.right),
-                      trial.duration_s.value_or(spec.duration_s)});
-  }
+  const std::vector<DrivenCommand> driven = driven_commands(problem.log, problem.commands);
   const std::vector<TrialContext> around = trial_contexts(problem.log, driven);
   std::set<std::vector<double>> conditions;
   for (std::size_t i = 0; i < driven.size(); ++i) {
@@ -189,10 +180,9 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
   if (summary.evaluated.outcome() == v1::OK) {
     evaluated["fitness"] = summary.evaluated.evaluate().fitness();
   }
-  Json idle = Json::array();
-  for (const IdleGene& gene : summary.idle) {
-    idle.push_back({{"parameter", gene.key}, {"remedy", gene.remedy}});
-  }
+  Json idle = mapped(summary.idle, [&](const IdleGene& gene) -> Json {
+    return {{"parameter", gene.key}, {"remedy", gene.remedy}};
+  });
   for (const Gene& gene : config.problem.genes) {
     const Parameter& row = config.problem.table()[gene.row];
     genes.push_back({{"parameter", row.key},
@@ -226,12 +216,9 @@ std::string directions_text(const FitnessSettings& fitness) {
   if (fitness.objectives.empty()) {
     return std::string(higher_is_better(fitness.kind) ? "higher" : "lower") + " is better";
   }
-  std::string text;
-  for (const SearchedObjective& objective : fitness.objectives) {
-    text += (text.empty() ? "" : ", ") + objective.name +
-            (objective.maximise ? " higher is better" : " lower is better");
-  }
-  return text;
+  return joined(fitness.objectives, ", ", [&](const SearchedObjective& objective) {
+    return objective.name + (objective.maximise ? " higher is better" : " lower is better");
+  });
 }
 
 // Of an objective, at the config's own values.

@@ -1,7 +1,6 @@
 #include "master/cli/data/idle_genes.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/try.h"
 #include "common/random/stream.h"

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "common/problem/problem.h"
@@ -182,16 +183,14 @@ Status check_formats(const ImportOptions& options, const ImportFormat& wanted) {
 Result<TrialLog> read_logs(const ImportOptions& options) {
   const ImportFormat* format = find_format(options.format);
   if (!format) {
-    std::vector<std::string> known;
-    for (const ImportFormat& row : kFormats) known.emplace_back(row.name);
+    std::vector<std::string> known =
+        mapped(kFormats, [](const ImportFormat& one) { return std::string(one.name); });
     known.emplace_back(kRuns);
     return Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)};
   }
   RETURN_IF_ERROR(check_formats(options, *format));
-  std::vector<std::string> commands;
-  for (const CommandSpec& command : default_commands(format->scenario)) {
-    commands.push_back(command.name);
-  }
+  std::vector<std::string> commands = mapped(
+      default_commands(format->scenario), [](const CommandSpec& command) { return command.name; });
   return read_trial_files(options.files, commands, options.reading.read);
 }
 

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "common/base/try.h"
-#include "common/config/config.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"
@@ -170,7 +169,7 @@ Result<int> run_init(InitOptions& options, CliContext& context) {
   context.begun = true;
   const LogFigures figures = figures_of(log, known);
   const std::string text = config_of_log(figures, log, known, options);
-  nlohmann::ordered_json json = {{"out", options.out}, {"trials", log.trials.size()}};
+  Json json = {{"out", options.out}, {"trials", log.trials.size()}};
   if (figures.speed_m_s) json["full_speed"] = *figures.speed_m_s;
   if (options.out == "-") {
     json["config"] = text;

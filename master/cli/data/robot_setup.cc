@@ -161,7 +161,7 @@ Result<int> run_init_robot(const std::vector<std::string>& arguments, const std:
   const RobotSetup setup = setup_of_arguments(arguments, out);
   ASSIGN_OR_RETURN(const RobotTexts texts, set_up_robot(setup, outputs));
   if (out != "-") RETURN_IF_ERROR(outputs.plan(std::vector<std::string>{setup.robot, out}));
-  nlohmann::ordered_json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};
+  Json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};
   if (out == "-") {
     json["config"] = texts.config;
     console.result(texts.config, json);

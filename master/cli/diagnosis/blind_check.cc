@@ -11,7 +11,6 @@
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/process/process_pool.h"
-#include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"

@@ -11,8 +11,6 @@
 #include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
-#include "common/problem/run_files.h"
-#include "common/robot/robot_file.h"
 #include "master/cli/diagnosis/diagnose_command.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
@@ -89,9 +87,7 @@ std::string diagnosis_summary(const Diagnosis& d) {
   return text;
 }
 
-// diagnosis.json without its trials.
-nlohmann::ordered_json diagnosis_summary_json(const Diagnosis& diagnosis,
-                                              const DiagnoseCommand& command) {
+Json diagnosis_summary_json(const Diagnosis& diagnosis, const DiagnoseCommand& command) {
   auto json = parse_json(to_json(diagnosis));
   json.erase("trials");
   json["out"] = command.out;
@@ -143,7 +139,7 @@ Provenance stamp_of(const Config& config, const DiagnoseCommand& command,
   Provenance stamp;
   stamp.command = "diagnose";
   stamp.problem = problem_hash(to_proto(config.problem));
-  nlohmann::ordered_json genes = nlohmann::ordered_json::object();
+  Json genes = Json::object();
   for (const Gene& gene : searched) {
     genes[config.problem.table()[gene.row].key] = {gene.lower, gene.upper};
   }

@@ -1,11 +1,11 @@
 // gapfarm diagnose: what its parts share.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "common/json/json.h"
 #include "common/recordings/run.h"
 #include "master/command/inputs.h"
 #include "master/command/outputs.h"
@@ -35,8 +35,7 @@ void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& comma
 
 std::string diagnosis_summary(const Diagnosis& diagnosis);
 // diagnosis.json without its trials.
-nlohmann::ordered_json diagnosis_summary_json(const Diagnosis& diagnosis,
-                                              const DiagnoseCommand& command);
+Json diagnosis_summary_json(const Diagnosis& diagnosis, const DiagnoseCommand& command);
 
 // Reads the log that --reference names, if it does.  Errors: the scenario is not of ground robots;
 // a model whose log is gone.

@@ -18,8 +18,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 struct EffectsOptions {
   std::string config;
   std::string figures;
@@ -39,15 +37,8 @@ constexpr double kAlike_m = 2e-3;
 constexpr double kAlike_rad = 5e-3;
 
 const char* stage_name(EffectStage stage) {
-  switch (stage) {
-    case EffectStage::kDrive:
-      return "drive";
-    case EffectStage::kFloor:
-      return "floor";
-    case EffectStage::kCamera:
-      return "camera";
-  }
-  return "?";
+  constexpr const char* kNames[] = {"drive", "floor", "camera"};
+  return kNames[static_cast<std::size_t>(stage)];
 }
 
 std::string value_text(const EffectParameter& p, double value) {
@@ -178,14 +169,6 @@ std::vector<EffectDrives> drives_of(const Problem& problem, const v1::SimulateRe
   return all;
 }
 
-v1::Override override_of(std::size_t row, double value) {
-  v1::Override override;
-  override.set_parameter(static_cast<std::uint32_t>(row));
-  override.set_value(value);
-  return override;
-}
-
-// The config's robot without any noise, or the nominal one.
 Result<Config> figure_config(const EffectsOptions& options) {
   Config config;
   if (options.config.empty()) {
@@ -254,9 +237,7 @@ Result<int> draw_figures(EffectsOptions& options, CliContext& context) {
   for (std::size_t k = 0; k < effects.size(); ++k) {
     const Effect& effect = problem.table().effects()[effects[k]];
     for (const v1::TaskResult& result : {results[2 * k], results[2 * k + 1]}) {
-      if (result.outcome() == v1::OK) continue;
-      return Error{effect.name + ": the simulation ended with " +
-                   v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"};
+      RETURN_IF_ERROR(ended_well(result, effect.name + ": the simulation"));
     }
     const auto drives =
         drives_of(problem, results[2 * k].simulate(), results[2 * k + 1].simulate());

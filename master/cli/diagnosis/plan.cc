@@ -124,19 +124,18 @@ std::string table_text(const plan::DesignedPlan& plan) {
   return text;
 }
 
-nlohmann::ordered_json table_json(const plan::DesignedPlan& plan) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+Json table_json(const plan::DesignedPlan& plan) {
+  Json rows = Json::array();
   for (std::size_t k = 0; k < plan.seen.size(); ++k) {
     const plan::Visibility& seen = plan.seen[k];
-    nlohmann::ordered_json row = {{"effect", seen.effect},    {"parameter", seen.parameter},
-                                  {"unit", seen.unit},        {"size", nullptr},
-                                  {"size_random", nullptr},   {"like", seen.like},
-                                  {"likeness", seen.likeness}};
+    Json row = {{"effect", seen.effect},    {"parameter", seen.parameter}, {"unit", seen.unit},
+                {"size", nullptr},          {"size_random", nullptr},      {"like", seen.like},
+                {"likeness", seen.likeness}};
     if (seen.size) row["size"] = *seen.size;
     if (plan.seen_at_random[k].size) row["size_random"] = *plan.seen_at_random[k].size;
     rows.push_back(std::move(row));
   }
-  nlohmann::ordered_json power = nlohmann::ordered_json::array();
+  Json power = Json::array();
   for (const plan::PowerPoint& p : plan.power) {
     power.push_back({{"trials", p.trials}, {"planned", p.planned}, {"random", p.random}});
   }
@@ -191,7 +190,7 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
     RETURN_IF_ERROR(
         options.outputs.write(options.picture, plan::plan_picture(source.config.problem, plan)));
   }
-  nlohmann::ordered_json json = table_json(plan);
+  Json json = table_json(plan);
   json["out"] = options.out;
   json["trials"] = plan.log.trials.size();
   context.console.result(

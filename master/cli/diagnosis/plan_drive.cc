@@ -151,16 +151,15 @@ std::string table_text(const DrivePlan& drive, const std::vector<Comparison>& ot
   for (std::size_t k = 0; k < drive.rows.size(); ++k) {
     text += fmt::format("{:<16}", drive.rows[k].name);
     for (const WidthsAt* at : columns) {
-      text += fmt::format(" {:>15}",
-                          width_text(drive.rows[k], at->widths[static_cast<Eigen::Index>(k)]));
+      text += fmt::format(" {:>15}", width_text(drive.rows[k], at->widths[k]));
     }
     text += "\n";
   }
   return text;
 }
 
-nlohmann::ordered_json widths_json(const std::vector<WidthsAt>& widths) {
-  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+Json widths_json(const std::vector<WidthsAt>& widths) {
+  Json all = Json::array();
   for (const WidthsAt& at : widths) {
     all.push_back(
         {{"seconds", at.t_s}, {"widths", std::vector<double>(at.widths.begin(), at.widths.end())}});
@@ -169,18 +168,18 @@ nlohmann::ordered_json widths_json(const std::vector<WidthsAt>& widths) {
 }
 
 // For people, and for programs.
-std::pair<std::string, nlohmann::ordered_json> result_of(const DrivePlan& drive,
-                                                         const std::vector<Comparison>& others,
-                                                         const plan::DriveNoise& noise,
-                                                         const std::vector<plan::Wanted>& wanted,
-                                                         const DriveTask& task) {
+std::pair<std::string, Json> result_of(const DrivePlan& drive,
+                                       const std::vector<Comparison>& others,
+                                       const plan::DriveNoise& noise,
+                                       const std::vector<plan::Wanted>& wanted,
+                                       const DriveTask& task) {
   std::string text =
       fmt::format(
           "noise (of the config; a fitted model knows it better): "
           "{:.2g} m and {:.2g} rad a reading, {:.2g} m and {:.2g} rad after a metre\n",
           noise.position_m, noise.heading_rad, noise.travel, noise.turn) +
       table_text(drive, others);
-  nlohmann::ordered_json json = {{"out", task.out}, {"values", nlohmann::ordered_json::array()}};
+  Json json = {{"out", task.out}, {"values", Json::array()}};
   for (const KinematicRow& row : drive.rows) {
     json["values"].push_back({{"name", row.name}, {"unit", row.unit}});
   }

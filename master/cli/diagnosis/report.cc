@@ -26,9 +26,9 @@ struct ReportCommand {
 
 struct Page {
   std::string html;
-  std::filesystem::path from;              // what was read
-  std::filesystem::path out;               // where it goes unless configured otherwise
-  nlohmann::ordered_json importance = {};  // of a run's parameters
+  std::filesystem::path from;  // what was read
+  std::filesystem::path out;   // where it goes unless configured otherwise
+  Json importance = {};        // of a run's parameters
 };
 
 // "fitness, explained by each alone: friction 0.42, full_speed 0.1"
@@ -85,7 +85,7 @@ Result<int> run_report(ReportCommand& command, CliContext& context) {
   RETURN_IF_ERROR(command.outputs.plan(command.history));
   context.begun = true;
   RETURN_IF_ERROR(command.outputs.write(out, page.html));
-  nlohmann::ordered_json json = {{"report", out}};
+  Json json = {{"report", out}};
   std::string text = out + "\n";
   if (!command.history.empty()) {
     ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.from));

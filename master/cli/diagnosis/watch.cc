@@ -14,9 +14,9 @@
 #include "master/cli/diagnosis/diagnose_command.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
+#include "master/ground/fit/fit_file.h"
 #include "master/ground/fit/wheel_loop.h"
 #include "master/ground/watch/changes.h"
-#include "master/ground/watch/run_cache.h"
 #include "master/ground/watch/watch_report.h"
 
 namespace gapfarm {
@@ -183,9 +183,8 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
                 WatchedFleet* fleet) {
   RunCache cache(cache_file);
   const bool by_wheels = std::all_of(robots->begin(), robots->end(), [](const RobotFolder& robot) {
-    return std::all_of(robot.runs.begin(), robot.runs.end(), [&](const RunFolder& run) {
-      return has_wheel_speeds(robot.robot, run.log);
-    });
+    return std::ranges::all_of(
+        robot.runs, [&](const RunFolder& run) { return has_wheel_speeds(robot.robot, run.log); });
   });
   std::size_t all = 0, done = 0;
   for (const RobotFolder& robot : *robots) all += robot.runs.size();
@@ -198,11 +197,12 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
       const RunLog log = by_wheels ? driven_by_wheels(std::move(run.log)) : std::move(run.log);
       const std::string key =
           Hasher().add(kFitVersion).add(format_robot(driven)).add(log_hash(log)).finish();
-      const Result<OffsetFit>* fit = cache.find(key);
-      if (fit == nullptr) {
+      std::optional<Result<OffsetFit>> fit = cache.find(key);
+      if (!fit) {
         context.console.progress(
             fmt::format("fitting run {} of {}: {}/{}", done, all, robot.name, run.name));
-        fit = &cache.keep(key, fit_run_values(driven, log, {{0.5, 2, 5}, 0.5}));
+        fit = fit_run_values(driven, log, {{0.5, 2, 5}, 0.5});
+        cache.keep(key, *fit);
         ++fleet->fitted;
       }
       if (!*fit) {
@@ -252,7 +252,7 @@ Result<int> run_watch(WatchCommand& command, CliContext& context) {
   std::vector<std::vector<OffsetFit>> fits;
   for (const WatchedRobot& robot : fleet.robots) fits.push_back(robot.fits);
   const FleetChanges changes = find_changes(fleet.rows, fits, command.seed);
-  const nlohmann::ordered_json json = watch_json(fleet, changes);
+  const Json json = watch_json(fleet, changes);
   RETURN_IF_ERROR(command.outputs.write_in(
       command.out,
       {{"watch.json", json.dump(2) + "\n"}, {"report.html", watch_page(fleet, changes)}}));

@@ -20,8 +20,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 struct CrossfitOptions {
   std::string config;
   TrialOptions trials;

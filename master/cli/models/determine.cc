@@ -57,8 +57,8 @@ LikelihoodOf farm_likelihood(Farm& farm, const Problem& problem, std::uint64_t s
   };
 }
 
-nlohmann::ordered_json to_json(const DetermineReport& report, const ParameterTable& table) {
-  nlohmann::ordered_json genes = nlohmann::ordered_json::array(), pairs = genes;
+Json to_json(const DetermineReport& report, const ParameterTable& table) {
+  Json genes = Json::array(), pairs = genes;
   for (const GeneDetermined& g : report.genes) {
     genes.push_back({{"parameter", table[g.gene.row].key},
                      {"value", g.value},

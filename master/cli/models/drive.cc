@@ -21,8 +21,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr double kSpacing_m = 0.02;  // between points of paths that are compared
 
 struct DriveCommand {
@@ -40,7 +38,6 @@ struct DriveCommand {
   FarmOptions farm;
 };
 
-// What is to be driven, and what was.
 struct Task {
   Pose start;
   std::vector<CommandSpec> commands;     // either these

@@ -3,13 +3,11 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
-#include "common/config/config.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
@@ -28,8 +26,8 @@ struct InfluenceCommand {
   FarmOptions farm;
 };
 
-nlohmann::ordered_json to_json(const InfluenceReport& report, const ParameterTable& table) {
-  nlohmann::ordered_json factors = nlohmann::ordered_json::array();
+Json to_json(const InfluenceReport& report, const ParameterTable& table) {
+  Json factors = Json::array();
   for (const FactorInfluence& f : report.factors) {
     factors.push_back({{"parameter", table[f.gene.row].key},
                        {"alone_m", f.alone.distance},

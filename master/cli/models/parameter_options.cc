@@ -3,14 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 
 namespace gapfarm {
 namespace {
 
 std::vector<std::string> keys_of(const ParameterTable& table) {
-  std::vector<std::string> keys;
-  for (const Parameter& row : table.rows()) keys.push_back(row.key);
+  std::vector<std::string> keys = mapped(table.rows(), &Parameter::key);
   return keys;
 }
 
@@ -66,16 +66,14 @@ Status apply_genes(const std::vector<std::string>& genes, Problem& problem,
         return Error{option + " " + text + ": " + s.error().message};
       }
     }
-    const bool twice = std::any_of(problem.genes.begin(), problem.genes.end(),
-                                   [&](const Gene& other) { return other.row == *row; });
+    const bool twice = contains(problem.genes, *row, &Gene::row);
     if (twice || gene.lower >= gene.upper) {
       return Error{option + " " + text + ": " + (twice ? "is there twice" : "has an empty range")};
     }
     if (gene.lower <= 0) gene.scale = ParameterScale::kLinear;
     problem.genes.push_back(gene);
   }
-  std::sort(problem.genes.begin(), problem.genes.end(),
-            [](const Gene& a, const Gene& b) { return a.row < b.row; });
+  std::ranges::sort(problem.genes, {}, &Gene::row);
   return {};
 }
 

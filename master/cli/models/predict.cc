@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -72,10 +71,7 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
   ASSIGN_OR_RETURN(const auto results, asked->run(asked->add_problem(to_proto(problem)), tasks));
   v1::PredictResult whole;
   for (const v1::TaskResult& result : results) {
-    if (result.outcome() != v1::OK) {
-      return Error{options.model + ": the simulation ended with " +
-                   v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"};
-    }
+    RETURN_IF_ERROR(ended_well(result, options.model + ": the simulation"));
     whole.MergeFrom(result.predict());
   }
   std::sort(whole.mutable_predictions()->begin(), whole.mutable_predictions()->end(),
@@ -120,7 +116,7 @@ void show_summary(const TrialLog& log, const std::vector<PredictedTrial>& predic
   const std::string summary = summarise_predictions(log, predictions);
   const std::string text = beside.empty() ? summary : summary + "\n" + beside;
   if (options.out == "-" && !console.json()) return console.note(text);
-  nlohmann::ordered_json json = {{"trials", predictions.size()}, {"summary", summary}};
+  Json json = {{"trials", predictions.size()}, {"summary", summary}};
   double score = 0;
   for (const PredictedTrial& p : predictions) {
     score += p.log_score / static_cast<double>(predictions.size());

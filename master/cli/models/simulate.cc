@@ -4,8 +4,6 @@
 
 #include "common/base/suggest.h"
 #include "common/base/try.h"
-#include "common/config/config.h"
-#include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "common/trials/select.h"
 #include "common/trials/write.h"
@@ -110,10 +108,8 @@ Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, 
       asked->run(hash, simulate_tasks(plan, {}, config.seed, config.simulate.path_interval_s)));
   TrialLog log;
   for (const v1::TaskResult& result : results) {
-    if (result.outcome() != v1::OK) {
-      return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                   result.message() + "); these parameters do not make a robot that drives"};
-    }
+    RETURN_IF_ERROR(
+        ended_well(result, "the simulation", "; these parameters do not make a robot that drives"));
     for (const v1::Trial& trial : result.simulate().trials())
       log.trials.push_back(from_proto(trial));
   }

@@ -87,7 +87,7 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
       command.settings.repeats, report.evaluations, spread_text(report.standard_spread),
       spread_text(report.standard_fresh), spread_text(report.best.spread),
       spread_text(report.best_fresh));
-  nlohmann::ordered_json values = nlohmann::ordered_json::object();
+  Json values = Json::object();
   for (const Gene& gene : config.problem.genes) {
     values[table[gene.row].key] = report.best.values[gene.row];
     text += fmt::format("  {:<22} {}\n", table[gene.row].key,

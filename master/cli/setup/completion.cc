@@ -57,7 +57,7 @@ complete -c gapfarm -f -a '(__gapfarm_words)'
 Result<int> print_candidates(const CompletionOptions& options, CliContext& context) {
   const std::unique_ptr<Program> program = make_program();
   std::string text;
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  Json list = Json::array();
   for (const CompletionCandidate& c : completion_candidates(*program->app, options.arguments)) {
     text += c.word + "\t" + c.summary + "\n";
     list.push_back({{"word", c.word}, {"summary", c.summary}});

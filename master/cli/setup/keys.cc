@@ -27,8 +27,7 @@ std::string key_name_of_host() {
   return name;
 }
 
-nlohmann::ordered_json key_json(const std::string& folder, const std::string& worker,
-                                const std::string& public_key) {
+Json key_json(const std::string& folder, const std::string& worker, const std::string& public_key) {
   return {{"folder", folder}, {"worker", worker}, {"public", public_key}};
 }
 
@@ -43,9 +42,8 @@ Result<KeyPair> worker_pair(const KeyFolder& folder, const std::string& name) {
 Status make_master(const KeyFolder& folder, Console& console) {
   if (folder.has_pair("master")) {
     console.note("master.key is there already and stays");
-  } else if (Status s = folder.add_pair("master", make_key_pair("master")); !s) {
-    return s;
-  }
+  } else
+    RETURN_IF_ERROR(folder.add_pair("master", make_key_pair("master")));
   ASSIGN_OR_RETURN(const KeyPair pair, folder.pair("master"));
   return folder.add_master_public({"master", pair.public_key});
 }
@@ -121,7 +119,7 @@ Result<int> run_revoke(const KeysOptions& options, CliContext& context) {
 Result<int> run_list(const KeysOptions& options, CliContext& context) {
   context.begun = true;
   ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  Json rows = Json::array();
   std::vector<std::string> trouble;
   const auto row = [&](const char* role, const std::string& name, const std::string& key) {
     rows.push_back({{"role", role}, {"name", name}, {"public", key}});

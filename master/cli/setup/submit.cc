@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/net/keys.h"
 #include "common/process/child.h"
@@ -29,9 +30,7 @@ struct SubmitCommand {
 };
 
 std::string quoted(const std::vector<std::string>& values) {
-  std::string text;
-  for (const std::string& word : values) text += (text.empty() ? "" : " ") + shell_quoted(word);
-  return text;
+  return joined(values, " ", shell_quoted);
 }
 
 // The run's folder as a whole path, also in `values`.

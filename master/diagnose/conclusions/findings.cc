@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <set>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
@@ -24,21 +25,12 @@ std::string estimate_text(const Estimate& e, double factor, const std::string& u
   return text + " (" + plain_number(factor * e.lo) + " to " + plain_number(factor * e.hi) + ")";
 }
 
-const Estimate* find(const NamedEffect& effect, std::string_view key) {
-  for (const Estimate& e : effect.parameters) {
-    if (e.key == key) return &e;
-  }
-  return nullptr;
-}
-
 // Without the words of a table: "name with key value unit, ...".
 std::string plain_claim(const NamedEffect& effect, bool intervals) {
-  std::vector<std::string> values;
-  for (const Estimate& e : effect.parameters) {
-    values.push_back(
-        e.key + " " +
-        estimate_text(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit, intervals));
-  }
+  std::vector<std::string> values = mapped(effect.parameters, [&](const Estimate& e) {
+    return e.key + " " +
+           estimate_text(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit, intervals);
+  });
   return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
 }
 
@@ -56,7 +48,7 @@ std::string claim(const NamedEffect& effect, const EffectDiagnoses& effects, boo
       continue;
     }
     const ShownParameter& shown = phrases.parameters[static_cast<std::size_t>(*c - '1')];
-    const Estimate* e = find(effect, shown.key);
+    const Estimate* e = find_by(effect.parameters, shown.key, &Estimate::key);
     if (e == nullptr) return plain_claim(effect, intervals);
     text += estimate_text(*e, shown.factor, shown.unit, intervals);
   }
@@ -71,24 +63,13 @@ std::string counted(std::size_t count, const std::string& one, const std::string
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-std::vector<std::string> names_of(const Diagnosis& diagnosis) {
-  std::vector<std::string> names;
-  for (const NamedEffect& effect : diagnosis.effects) names.push_back(effect.name);
-  return names;
-}
-
 }  // namespace
 
 std::string plain_number(double value) {
   if (!std::isfinite(value)) return "an unknown number";
-  char text[32];
   const double size = std::abs(value);
-  if (size >= 1000 && size < 1e7) {
-    std::snprintf(text, sizeof text, "%.0f", value);
-  } else {
-    std::snprintf(text, sizeof text, "%.3g", value);
-  }
-  return std::string(text) == "-0" ? "0" : text;
+  const std::string text = formatted(size >= 1000 && size < 1e7 ? "%.0f" : "%.3g", value);
+  return text == "-0" ? "0" : text;
 }
 
 std::string listed(std::span<const std::string> phrases, std::string_view last) {
@@ -163,14 +144,13 @@ std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effec
 }
 
 std::vector<std::string> findings(const Diagnosis& diagnosis) {
-  const std::vector<std::string> names = names_of(diagnosis);
   const double gap = diagnosis.gap.tuned - diagnosis.gap.floor;
   const double closed = gap > 0 ? (diagnosis.gap.tuned - diagnosis.gap.final_) / gap : 0;
   std::vector<std::string> text;
   for (const NamedEffect& effect : diagnosis.effects) {
     text.push_back(effect.text.empty() ? effect_sentence(effect) : effect.text);
   }
-  if (names.size() > 1) {
+  if (diagnosis.effects.size() > 1) {
     text.push_back("Together they close " + percent(closed) + " of the gap" +
                    change_text(diagnosis.position_mm, diagnosis.heading_mrad) + ".");
   }
@@ -347,8 +327,7 @@ std::vector<Leftover> leftovers(const Regression& explained,
     all.push_back({block.name, std::log10(std::max(p, 1e-300)),
                    std::max(0.0, (gain.squares - gain.dimensions * scale) / 2)});
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });
+  std::ranges::stable_sort(all, {}, &Leftover::log10_p);
   return all;
 }
 

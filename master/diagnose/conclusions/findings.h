@@ -43,10 +43,8 @@ std::string effect_sentence(const NamedEffect& effect,
 // Its claim alone, without intervals and full stop.
 std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects);
 
-// The verdict and its reasons, a sentence each.
 std::vector<std::string> findings(const Diagnosis& diagnosis);
 
-// How much of what effects look at varies in a log.
 struct LogVariety {
   std::size_t trials = 0;
   std::size_t sessions = 0;
@@ -75,7 +73,6 @@ std::string alias_sentence(const std::string& effect, const std::vector<std::str
 std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                                   std::span<const Cell> cells, const TrialLog& log);
 
-// How strongly the leftover residuals still depend on a block of covariates.
 struct Leftover {
   std::string covariate;
   double log10_p = 0;

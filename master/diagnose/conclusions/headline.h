@@ -18,7 +18,6 @@ std::string headline(const Diagnosis& diagnosis,
 std::string action(const Diagnosis& diagnosis,
                    const EffectDiagnoses& effects = drive_effect_diagnoses());
 
-// Fills in headline, action and findings.
 void fill_conclusions(const EffectDiagnoses& effects, Diagnosis* diagnosis);
 
 // That an effect that gained `gain` nats beyond luck, where `least_gain` names one, is there, or

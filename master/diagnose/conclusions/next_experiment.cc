@@ -3,11 +3,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <optional>
 #include <set>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/score/fitness.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -37,7 +36,7 @@ void keep(const v1::PredictResult& result, Predictions& to) {
 std::vector<std::string> groups_of(const ExperimentPlan& plan) {
   std::vector<std::string> groups;
   for (const Design& design : plan.designs) {
-    if (std::find(groups.begin(), groups.end(), design.group) != groups.end()) continue;
+    if (contains(groups, design.group)) continue;
     groups.push_back(design.group);
   }
   return groups;
@@ -189,9 +188,7 @@ NextExperiment hopeless(const std::vector<Pair>& pairs, const ExperimentPlan& pl
 }
 
 void erase(const std::vector<Pair>& done, std::vector<Pair>& pairs) {
-  std::erase_if(pairs, [&](const Pair& pair) {
-    return std::find(done.begin(), done.end(), pair) != done.end();
-  });
+  std::erase_if(pairs, [&](const Pair& pair) { return contains(done, pair); });
 }
 
 }  // namespace

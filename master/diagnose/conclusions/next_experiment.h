@@ -62,10 +62,8 @@ struct PredictedEnd {
 // 0 when a covariance is not positive definite (nothing is known then).
 double divergence(const PredictedEnd& a, const PredictedEnd& b);
 
-// Trials after which the likelihood ratio of the two is wrong at most once in twenty, either way.
-// For n trials it is about normal with mean +-n D and variance 2 n D (exactly so for a shift of a
-// Gaussian), so n = 2 * 1.645^2 / D = 5.41 / D.  (Chernoff and Stein's lemma gives the same rate
-// in D at a fixed level: ln 20 / D = 3.0 / D for one error alone.)  At least 3.
+// Trials after which the likelihood ratio of the two is wrong at most once in twenty, either way:
+// about normal with mean +-n D and variance 2 n D, so n = 2 * 1.645^2 / D = 5.41 / D.  At least 3.
 std::uint64_t trials_needed(double divergence);
 
 // Predicts every alternative on the plan's designs and says which of them distinguish the

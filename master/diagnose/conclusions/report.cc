@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/effects/catalogue.h"
 #include "common/math/statistics.h"
@@ -73,7 +74,6 @@ DiagnosisResult begun(const DiagnosisRequest& of) {
   return result;
 }
 
-// A chosen effect and its aliases, each at its best linear fit beside the others.
 Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explanation& named,
                                         std::size_t k, const Proposals& catalogue) {
   const ParameterTable& table = of.table();
@@ -88,8 +88,7 @@ Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explan
   CompetingCauses alternatives;
   for (const EffectCandidate& c : candidates) {
     const std::string& name = c.signature.effect;
-    const bool alias =
-        std::find(chosen.aliases.begin(), chosen.aliases.end(), name) != chosen.aliases.end();
+    const bool alias = contains(chosen.aliases, name);
     if (!alias && name != kind_of(own)) continue;
     Overrides at = named.study().base;
     if (alias) {
@@ -103,9 +102,7 @@ Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explan
     }
     CompetingCause alternative{alias ? name : own, {}};
     for (const auto& [row, value] : at) {
-      alternative.overrides.emplace_back();
-      alternative.overrides.back().set_parameter(static_cast<std::uint32_t>(row));
-      alternative.overrides.back().set_value(value);
+      alternative.overrides.push_back(override_of(row, value));
     }
     alternatives.push_back(std::move(alternative));
   }
@@ -132,10 +129,8 @@ std::string place_text(const DiagnosisRequest& of, const Signature& second,
 
 std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p) {
   std::erase_if(left, [&](const Leftover& l) { return !(l.log10_p < unknown_log10_p); });
-  std::stable_sort(left.begin(), left.end(),
-                   [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });
-  std::vector<std::string> covariates;
-  for (const Leftover& l : left) covariates.push_back(l.covariate);
+  std::ranges::stable_sort(left, {}, &Leftover::log10_p);
+  std::vector<std::string> covariates = mapped(left, [](const Leftover& l) { return l.covariate; });
   if (covariates.empty()) return {};
   return {"What is left still depends on " + listed(covariates) +
           (covariates.size() > 1 ? " (the clearest first)." : ".")};
@@ -277,17 +272,16 @@ Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const
     const std::string& name = effect.candidate.signature.effect;
     const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
     if (keys.empty() || kind_of(name) != name) continue;
-    const auto second = catalogue.again(explained, name);
-    if (!second) return second.error();
-    if (second->gain < of.subject.least_gain) continue;
+    ASSIGN_OR_RETURN(const auto second, catalogue.again(explained, name));
+    if (second.gain < of.subject.least_gain) continue;
     Regression with_it = explained;
-    with_it.add(second->signature.columns);
+    with_it.add(second.signature.columns);
     const std::vector<Leftover> left = leftovers(with_it, named.evidence->blocks);
     const bool all = left.empty() || left.front().log10_p >= of.subject.unknown_log10_p;
     const bool two = is_named(second_of(name)), room = !two && !second_of(name).empty();
     sentences.push_back(std::string(two ? "A third " : "A second ") + name + " (" +
-                        place_text(of, second->signature, keys) + ") would explain " +
-                        std::to_string(std::lround(second->gain)) + " nats more of what is left" +
+                        place_text(of, second.signature, keys) + ") would explain " +
+                        std::to_string(std::lround(second.gain)) + " nats more of what is left" +
                         (all ? ", and nothing would remain" : "") +
                         (room ? "; that is too little, or too near the first, to name it."
                               : std::string("; a model holds ") + (two ? "two." : "one.")));

@@ -48,12 +48,11 @@ std::optional<double> bound_of(const Judgement& judged, std::size_t row) {
   Eigen::MatrixXd information = infer::information(slopes, judged.named.evidence->nuisances);
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const BaseParameter& p = study.base_parameters[k];
-    const auto i = static_cast<Eigen::Index>(k);
-    information(i, i) += 1 / std::pow(p.prior_log_sd * study.base.at(p.row), 2);
+    information(k, k) += 1 / std::pow(p.prior_log_sd * study.base.at(p.row), 2);
   }
   const Eigen::VectorXd least = infer::least_deviations(information);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
-    const double bound = least[static_cast<Eigen::Index>(k)] * std::sqrt(judged.scale);
+    const double bound = least[k] * std::sqrt(judged.scale);
     if (fit.parameters[k].row == row && std::isfinite(bound)) return bound;
   }
   return {};
@@ -172,7 +171,6 @@ std::vector<SpreadEffect> spread_effects(const Refit& refit) {
   return found;
 }
 
-// With the names that the log has for them.
 std::vector<SessionGain> named_sessions(const DiagnosisRequest& of, const Study& study,
                                         std::vector<SessionGain> gains) {
   for (std::size_t i = 0; i < study.size() && !gains.empty(); ++i) {
@@ -279,8 +277,7 @@ std::vector<NamedEffect> named_effects(const DiagnosisRequest& of, const Refit& 
   for (const SpreadEffect& found : spread_effects(refit)) {
     all.emplace_back(found.gain, named_spread(of, refit, found));
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::ranges::stable_sort(all, [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<NamedEffect> effects;
   double gap = refit.floor - mean(refit.nested.front().scores);
   for (auto& [gain, effect] : all) {

@@ -1,7 +1,6 @@
 // What the report of a diagnosis is made of.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,7 +40,6 @@ void fill_values(const DiagnosisRequest& of, const Refit& refit, DiagnosisResult
 void set_noise(const DiagnosisRequest& of, const NoiseEstimate& noise, Overrides* at);
 
 std::vector<DiagnosedTrial> diagnosed_trials(const DiagnosisRequest& of, const Refit& refit);
-// What was tuned, and of the named effects; once values are known.
 void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisResult* result);
 // Some drives once more from where they began, by both models.  One that does not end well is
 // omitted: the picture can do without.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/base/ranges.h"
 #include "common/effects/catalogue.h"
 #include "common/math/digits.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -15,7 +16,6 @@
 namespace gapfarm::steps {
 namespace {
 
-// What is reported of an effect that no mean shows.
 struct ScreenedSize {
   double gain = 0;
   std::string key;  // the value's
@@ -64,7 +64,6 @@ ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
   return note("cannot be seen in this log: one level and one duration make it another full speed");
 }
 
-// Of what widens the distribution, into values of base and effects.
 void set_spreads(const DiagnosisRequest& of, const Refit& refit, Overrides* at) {
   const Explanation& named = refit.judged.named;
   const auto set = [&](const std::string& key, double value) {
@@ -126,12 +125,10 @@ std::vector<Screened> complete_rows(const DiagnosisRequest& of, const Screening&
   const std::vector<ChosenEffect>& chosen = judged.named.chosen;
   for (const Effect& effect : of.table().effects()) {
     const std::string& name = effect.name;
-    const bool there =
-        std::any_of(rows.begin(), rows.end(), [&](const Screened& s) { return s.effect == name; });
+    const bool there = contains(rows, name, &Screened::effect);
     // A second one of a kind is looked for where a first was found.
-    const bool named = std::any_of(chosen.begin(), chosen.end(), [&](const ChosenEffect& c) {
-      return c.candidate.signature.effect == name;
-    });
+    const bool named = std::ranges::any_of(
+        chosen, [&](const ChosenEffect& c) { return c.candidate.signature.effect == name; });
     if (there || (!effect.repeats.empty() && !named)) continue;
     Screened& row = rows.emplace_back();
     row.effect = name;
@@ -168,8 +165,7 @@ std::vector<std::string> not_looked_for(const DiagnosisRequest& of) {
   std::string lacking;
   const std::span<const Effect> known = of.table().effects();
   for (const Effect& effect : of.problem.external ? srv1_effects() : std::span<const Effect>{}) {
-    const bool there = std::any_of(known.begin(), known.end(),
-                                   [&](const Effect& e) { return e.name == effect.name; });
+    const bool there = contains(known, effect.name, &Effect::name);
     if (!there) lacking += (lacking.empty() ? "" : ", ") + effect.name;
   }
   if (!lacking.empty()) {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <string_view>
 
+#include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
-#include "master/diagnose/correction/fit.h"
 
 namespace gapfarm {
 namespace {
@@ -28,7 +28,7 @@ constexpr double kBeyond = 0.1;  // that a row goes on past the last reading, of
 Eigen::VectorXd scaled_point(const ResidualTerm& term, const LoggedMotion& facts,
                              const Pose& X_WR) {
   const auto known = residual_covariates();
-  Eigen::VectorXd point(static_cast<Eigen::Index>(2 * term.covariates.size()));
+  Eigen::VectorXd point(2 * term.covariates.size());
   point.setZero();
   for (std::size_t j = 0; j < term.covariates.size(); ++j) {
     const ResidualCovariate& covariate = known[term.covariates[j]];
@@ -52,8 +52,7 @@ std::vector<std::size_t> rows_of_covariates(std::initializer_list<std::string_vi
   std::vector<std::size_t> rows;
   const auto known = residual_covariates();
   for (const std::string_view name : names) {
-    const auto at = std::find_if(known.begin(), known.end(),
-                                 [&](const ResidualCovariate& c) { return c.name == name; });
+    const auto at = std::ranges::find(known, name, &ResidualCovariate::name);
     rows.push_back(static_cast<std::size_t>(at - known.begin()));
   }
   return rows;
@@ -162,10 +161,9 @@ void ResidualBasis::place_lengths(const std::vector<Place>& among,
 
 // Greedily the trial farthest from all centres so far, until every trial is near one.
 void ResidualBasis::place_centres(const std::vector<Place>& among) {
-  std::vector<Eigen::VectorXd> points;
-  for (const Place& place : among) {
-    points.push_back(scaled_point(term_, data_.facts[place.trial], place.X_WR));
-  }
+  std::vector<Eigen::VectorXd> points = mapped(among, [&](const Place& place) {
+    return scaled_point(term_, data_.facts[place.trial], place.X_WR);
+  });
   const std::size_t most = groups_.size() > 1 ? kMostOfCommand : kMostOfAll;
   std::vector<std::size_t> centres;
   std::vector<double> away(points.size(), INFINITY);
@@ -179,18 +177,16 @@ void ResidualBasis::place_centres(const std::vector<Place>& among) {
   }
   const bool constant = centres.size() < 2;
   useful_ = !centres.empty() && !(constant && term_.frame == ResidualFrame::kReadings);
-  term_.centres.resize(static_cast<Eigen::Index>(centres.size()),
-                       static_cast<Eigen::Index>(term_.covariates.size()));
+  term_.centres.resize(centres.size(), term_.covariates.size());
   kernel_.resize(term_.centres.rows(), term_.centres.rows());
   for (std::size_t k = 0; k < centres.size(); ++k) {
-    const auto row = static_cast<Eigen::Index>(k);
     for (std::size_t j = 0; j < term_.covariates.size(); ++j) {
       const double at = value(term_.covariates[j], among[centres[k]]);
-      term_.centres(row, static_cast<Eigen::Index>(j)) = std::round(at * 1e4) / 1e4;
+      term_.centres(k, j) = std::round(at * 1e4) / 1e4;
     }
     for (std::size_t l = 0; l < centres.size(); ++l) {
       const double d2 = (points[centres[k]] - points[centres[l]]).squaredNorm();
-      kernel_(row, static_cast<Eigen::Index>(l)) = std::exp(-0.5 * d2);
+      kernel_(k, l) = std::exp(-0.5 * d2);
     }
   }
   kernel_.diagonal().array() += kJitter;

@@ -16,7 +16,6 @@
 
 namespace gapfarm {
 
-// A term before it is fitted.
 struct ResidualShape {
   ResidualFrame frame = ResidualFrame::kRobot;
   bool by_drive = true;
@@ -38,7 +37,6 @@ class ResidualBasis {
   ResidualBasis(const ResidualData& data, const Residuals& residuals, const std::vector<bool>& seen,
                 const ResidualShape& shape, const std::vector<double>& lengths);
 
-  // Whether anything varies that the shifts could depend on.
   bool useful() const { return useful_; }
 
   // A term fitted to the residuals of the trials with learn[i], prior standard deviation of the
@@ -50,16 +48,13 @@ class ResidualBasis {
   std::vector<Residuals> shifts(const Residuals& residuals, const std::vector<bool>& learn,
                                 const std::vector<double>& amplitudes,
                                 const std::vector<bool>& wanted) const;
-  // Of every trial, by a fitted term of this basis.
   Residuals shifts_of(const ResidualTerm& term) const;
 
  private:
-  // Where a covariate may be looked at.
   struct Place {
     std::size_t trial = 0;
     Pose X_WR;
   };
-  // The trials that one group's shifts are learned from.
   struct Lesson {
     std::vector<std::size_t> trials;
     Residuals whitened;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 #include "common/math/laws.h"
@@ -16,7 +15,6 @@ constexpr std::size_t kMostFittedTerms = 3;
 // Prior standard deviations of shifts, in units of the noise's.
 const std::vector<double> kAmplitudes = {0.5, 2, 8, 32};
 
-// The procedure on some of a log's trials.
 class FieldSearch {
  public:
   FieldSearch(const ResidualData& data, const Residuals& residuals, const std::vector<bool>& seen)
@@ -53,13 +51,11 @@ class FieldSearch {
   }
 
  private:
-  // A part of the seen trials that is predicted from the others.
   struct Fold {
     std::vector<bool> learn, own;
     Residuals left;  // after the terms so far, fitted without it
   };
 
-  // Of all that may come next.
   void set_bases() {
     bases_.clear();
     for (const ResidualShape& shape : residual_shapes(data_.free_commands)) {

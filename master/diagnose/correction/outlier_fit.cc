@@ -33,7 +33,6 @@ struct Range {
   double least, most;
 };
 
-// Half the width of the amounts, and their middle.
 double half_of(const OutlierDrives& s) { return (s.most - s.least) / 2; }
 double middle_of(const OutlierDrives& s) { return (s.most + s.least) / 2; }
 

@@ -65,8 +65,7 @@ SpreadFit start_fit(double gain, double share, double angle, double starts) {
 // came before them are something else.
 SpreadFit fit_unsettled(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                         double outlier_share) {
-  const auto starts = static_cast<std::size_t>(
-      std::count_if(study.trials.begin(), study.trials.end(), follows_move));
+  const auto starts = static_cast<std::size_t>(std::ranges::count_if(study.trials, follows_move));
   if (starts < kFewestStarts || study.size() - starts < kFewestStarts) return {};
   const std::vector<double> straight = scores_of(study, residuals, outlier_share);
   SpreadFit best;

@@ -1,11 +1,10 @@
 #include "master/diagnose/evidence/latency.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <vector>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/algebra.h"
 
@@ -44,7 +43,6 @@ double probability_of(double share, double log_ratio) {
   return share * ratio / (1 - share + share * ratio);
 }
 
-// The reading that ends one trial and starts the next.
 struct SharedReading {
   std::size_t before = 0;
   std::size_t after = 0;
@@ -87,7 +85,6 @@ Eigen::MatrixXd cleaned(const Eigen::MatrixXd& nuisances, const Eigen::MatrixXd&
   return columns - nuisances * least_squares_of(nuisances, columns);
 }
 
-// Sums over trials of products of the lag's mark and of what was measured.
 struct Sums {
   double mark2 = 0, product = 0, measured2 = 0;
   Eigen::Index freedom = 0;
@@ -108,8 +105,7 @@ class PathFit {
   Result<std::vector<std::vector<PathSample>>> simulate(double tau_s) {
     Overrides at = study_.base;
     at[predictor_.problem().table().row("motor_lag.tau")] = tau_s;
-    std::vector<CommandSpec> commands;
-    for (const Cell& cell : study_.cells) commands.push_back(cell.command);
+    std::vector<CommandSpec> commands = mapped(study_.cells, &Cell::command);
     return predictor_.paths(at, commands, kInterval_s);
   }
 
@@ -186,10 +182,9 @@ LatencyFit fit_latency(std::span<const ReadingGap> gaps,
   constexpr double kShares[] = {0.03, 0.06, 0.1, 0.15, 0.2, 0.3,  0.4,
                                 0.5,  0.6,  0.7, 0.8,  0.9, 0.999};
   const auto evidence = [&](double age_s) {
-    std::vector<double> ratios;
-    for (const ReadingGap& g : gaps) {
-      ratios.push_back(log_density(g, age_s, kCap) - log_density(g, 0, kCap));
-    }
+    std::vector<double> ratios = mapped(gaps, [&](const ReadingGap& g) {
+      return log_density(g, age_s, kCap) - log_density(g, 0, kCap);
+    });
     return ratios;
   };
   best = best_mixture(evidence, kShares);

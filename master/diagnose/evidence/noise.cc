@@ -2,11 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlopt.hpp>
 #include <numeric>
-#include <vector>
 
 #include "common/math/statistics.h"
 #include "common/score/scale_mixture.h"

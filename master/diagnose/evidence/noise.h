@@ -28,7 +28,6 @@ std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
 
 struct DiagnosisSubject;  // master/diagnose/subject.h
 
-// The noise of a log's trials with its log-likelihood.
 struct NoiseFit {
   NoiseEstimate noise;
   double nats = 0;  // over all trials

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "common/pose/pose.h"

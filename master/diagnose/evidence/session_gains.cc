@@ -38,14 +38,13 @@ Eigen::MatrixXd common_gains(const Study& study) {
   }
   weights.push_back(std::move(path));
   weights.push_back(std::move(time));
-  Eigen::MatrixXd columns(static_cast<Eigen::Index>(3 * study.size()),
-                          static_cast<Eigen::Index>(weights.size()));
+  Eigen::MatrixXd columns(3 * study.size(), weights.size());
   for (std::size_t k = 0; k < weights.size(); ++k) {
     std::vector<Eigen::Vector3d> d;
     for (std::size_t i = 0; i < study.size(); ++i) {
       d.push_back(weights[k][i] * of_gain(study.trials[i]));
     }
-    columns.col(static_cast<Eigen::Index>(k)) = study.whiten(d);
+    columns.col(k) = study.whiten(d);
   }
   return columns;
 }
@@ -111,7 +110,7 @@ std::vector<double> weights_at(const Study& study, const Eigen::MatrixXd& common
   const Eigen::VectorXd left = data - common * at.common;
   for (std::size_t i = 0; i < study.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(3 * i);
-    const double gain = at.gain[static_cast<Eigen::Index>(study.trials[i].session)];
+    const double gain = at.gain[study.trials[i].session];
     const double squared = (left.segment<3>(row) - gain * gains.segment<3>(row)).squaredNorm();
     weight.push_back(study.ignores(i) ? 0 : std::min(1.0, kFarSquared / std::max(squared, 1e-12)));
   }
@@ -137,21 +136,19 @@ AtSpread medians_of(const Study& study, const Eigen::MatrixXd& common, const Eig
                     const Eigen::VectorXd& data) {
   std::vector<std::vector<double>> own(study.sessions);
   for (std::size_t i = 0; i < study.size(); ++i) {
-    const Eigen::Vector3d g = gains.segment<3>(static_cast<Eigen::Index>(3 * i));
+    const Eigen::Vector3d g = gains.segment<3>(3 * i);
     if (study.ignores(i) || g.squaredNorm() == 0) continue;
-    own[study.trials[i].session].push_back(
-        g.dot(data.segment<3>(static_cast<Eigen::Index>(3 * i))) / g.squaredNorm());
+    own[study.trials[i].session].push_back(g.dot(data.segment<3>(3 * i)) / g.squaredNorm());
   }
   AtSpread at;
   at.common = Eigen::VectorXd::Zero(common.cols());
-  at.gain = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(study.sessions));
+  at.gain = Eigen::VectorXd::Zero(study.sessions);
   for (std::size_t s = 0; s < own.size(); ++s) {
-    if (!own[s].empty()) at.gain[static_cast<Eigen::Index>(s)] = median(own[s]);
+    if (!own[s].empty()) at.gain[s] = median(own[s]);
   }
   return at;
 }
 
-// Over a grid of spreads.
 struct SpreadCurve {
   std::vector<double> spread, nats;
   std::size_t best = 0;
@@ -231,10 +228,9 @@ std::vector<double> scores_with_session_gains(const Study& study,
       if (study.trials[i].session != s) continue;
       own.push_back(i);
       const auto row = static_cast<Eigen::Index>(3 * i);
-      const auto k = static_cast<Eigen::Index>(s);
       const Eigen::Vector3d g = gains.segment<3>(row);
-      const double ss = std::max(0.0, sums.ss[k] - weight[i] * g.squaredNorm());
-      const double sr = sums.sr[k] - weight[i] * g.dot(data.segment<3>(row));
+      const double ss = std::max(0.0, sums.ss[s] - weight[i] * g.squaredNorm());
+      const double sr = sums.sr[s] - weight[i] * g.dot(data.segment<3>(row));
       const double variance = spread * spread / (1 + spread * spread * ss);
       left[i] -= variance * sr * of_gain(study.trials[i]);
       unknown += variance;
@@ -258,12 +254,10 @@ std::vector<double> scores_with_session_gains(const Study& study,
 
 Eigen::MatrixXd session_columns(const Study& study, double spread) {
   const Eigen::VectorXd gains = whitened_gains(study);
-  Eigen::MatrixXd columns =
-      Eigen::MatrixXd::Zero(gains.size(), static_cast<Eigen::Index>(study.sessions));
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(gains.size(), study.sessions);
   for (std::size_t i = 0; i < study.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(3 * i);
-    columns.block<3, 1>(row, static_cast<Eigen::Index>(study.trials[i].session)) =
-        spread * gains.segment<3>(row);
+    columns.block<3, 1>(row, study.trials[i].session) = spread * gains.segment<3>(row);
   }
   return columns;
 }

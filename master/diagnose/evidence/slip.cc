@@ -10,6 +10,7 @@
 #include <nlopt.hpp>
 #include <utility>
 
+#include "common/base/text.h"
 #include "common/pose/segment.h"
 #include "common/score/density.h"
 
@@ -119,7 +120,6 @@ struct DrivenLine {
   Eigen::Vector2d from, to;
 };
 
-// Where drives may pass through.
 struct Place {
   std::function<bool(const DrivenLine&)> passed;
   std::string description;
@@ -155,11 +155,7 @@ std::vector<double> expected(const Study& study, std::span<const double> slipped
   return all;
 }
 
-std::string metres(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f", value);
-  return text;
-}
+std::string metres(double value) { return formatted("%.2f", value); }
 
 Place disc(const Eigen::Vector2d& centre, double radius_m) {
   return {[=](const DrivenLine& driven) {

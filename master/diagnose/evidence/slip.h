@@ -24,7 +24,6 @@ struct SlipFit {
 SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
                  const std::vector<bool>& mask, const NoiseEstimate& start);
 
-// One trial once slips are foreseen.
 struct SlipTrial {
   double score = 0;    // log predictive density, nats
   double slipped = 0;  // probability that a side did

@@ -51,11 +51,9 @@ std::vector<FittedParameter> parameters_of(const Study& study, const Overrides& 
   return parameters;
 }
 
-// Predictions at `fit.at`.
 Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
-  auto ends = predictor.ends({{fit->at, {}}});
-  if (!ends) return ends.error();
-  fit->ends = std::move(ends->front());
+  ASSIGN_OR_RETURN(auto ends, predictor.ends({{fit->at, {}}}));
+  fit->ends = std::move(ends.front());
   fit->residuals.clear();
   for (std::size_t i = 0; i < study.size(); ++i) {
     fit->residuals.push_back(residual_of(study.trials[i], fit->ends[i]));
@@ -95,15 +93,14 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   for (const FittedParameter& p : fit->parameters) {
     requests.push_back({p.row, step_of(predictor.problem().table()[p.row], p.value)});
   }
-  fit->jacobian.setZero(static_cast<Eigen::Index>(3 * study.size()),
-                        static_cast<Eigen::Index>(fit->parameters.size()));
+  fit->jacobian.setZero(3 * study.size(), fit->parameters.size());
   if (requests.empty()) return {};
   ASSIGN_OR_RETURN(const auto from, slope_point(predictor, study, fit->at, fit->ends));
   ASSIGN_OR_RETURN(auto slopes, slopes_at(predictor, from, requests));
   if (Status s = rescale(predictor, study, from, requests, &slopes); !s) return s;
   for (std::size_t k = 0; k < slopes.size(); ++k) {
     if (!slopes[k]) continue;
-    fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(*slopes[k]);
+    fit->jacobian.col(k) = study.whiten(*slopes[k]);
   }
   return {};
 }
@@ -133,9 +130,8 @@ void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
   const std::vector<BaseParameter>& base = study.base_parameters;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const double sd = base[k].prior_log_sd * study.base.at(base[k].row);
-    const auto i = static_cast<Eigen::Index>(k);
-    normal->matrix(i, i) += 1 / (sd * sd);
-    normal->right[i] += (study.base.at(base[k].row) - fit.parameters[k].value) / (sd * sd);
+    normal->matrix(k, k) += 1 / (sd * sd);
+    normal->right[k] += (study.base.at(base[k].row) - fit.parameters[k].value) / (sd * sd);
   }
   // Keeps a direction that the data do not see where it is.
   const double scale = normal->matrix.diagonal().maxCoeff();
@@ -144,7 +140,7 @@ void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
 
 // Bounded for trials far out.
 double weight_of(const Study& study, Eigen::Index trial, const Eigen::VectorXd& z) {
-  if (study.ignores(static_cast<std::size_t>(trial))) return 0;
+  if (study.ignores(trial)) return 0;
   const double d2 = z.segment<3>(3 * trial).squaredNorm();
   return d2 > kFarSquared ? std::sqrt(kFarSquared / d2) : 1;
 }
@@ -172,7 +168,7 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   const Eigen::MatrixXd inverse = inverse_of_symmetric(normal.matrix);
   Eigen::VectorXd lower = Eigen::VectorXd::Constant(p + q, -INFINITY), upper = -lower;
   for (Eigen::Index k = 0; k < p; ++k) {
-    const FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
+    const FittedParameter& parameter = fit->parameters[k];
     const Parameter& row = problem.table()[parameter.row];
     upper[k] = kMostOfRange * (row.upper - row.lower);
     lower[k] = -upper[k];
@@ -182,7 +178,7 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   }
   const Eigen::VectorXd delta = bounded_minimum(normal.matrix, normal.right, lower, upper);
   for (Eigen::Index k = 0; k < p; ++k) {
-    FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
+    FittedParameter& parameter = fit->parameters[k];
     const Parameter& row = problem.table()[parameter.row];
     parameter.value = within(row, parameter.value + delta[k]);
     parameter.standard_error = std::sqrt(std::max(0.0, inverse(k, k)));
@@ -260,7 +256,7 @@ double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
   const Eigen::VectorXd left = z - nuisances * taken;
   double sum = taken.squaredNorm();
   for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
-    if (study.ignores(static_cast<std::size_t>(i))) continue;
+    if (study.ignores(i)) continue;
     const double d2 = left.segment<3>(3 * i).squaredNorm();
     sum += d2 > kFarSquared ? 2 * std::sqrt(kFarSquared * d2) - kFarSquared : d2;
   }
@@ -299,7 +295,7 @@ std::map<std::string, double> values_at(const Study& study, const Regression& ot
   } else {
     for (std::size_t k = 0; k < signature.parameters.size(); ++k) {
       const std::string& key = signature.parameters[k];
-      values[key] = table[table.row(key)].nominal + c[static_cast<Eigen::Index>(k)];
+      values[key] = table[table.row(key)].nominal + c[k];
     }
   }
   for (auto& [key, value] : values) {

@@ -17,7 +17,6 @@ struct FittedParameter {
   double standard_error = 0;
 };
 
-// The base and some effects, fitted together.
 struct JointFit {
   Overrides at;                             // base and effects
   std::vector<FittedParameter> parameters;  // the base's first

@@ -1,13 +1,11 @@
 #include "master/diagnose/fit/proposals.h"
 
 #include <algorithm>
-#include <iterator>
-#include <map>
-#include <utility>
+#include <functional>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/effects/catalogue.h"
-#include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
 
@@ -40,7 +38,7 @@ bool Proposals::may_be_second(const std::string& second,
                               const std::set<std::string>& without) const {
   const std::span<const Effect> known = study_->table->effects();
   return !without.count(second) && !excluded_.count(second) &&
-         std::any_of(known.begin(), known.end(), [&](const Effect& e) { return e.name == second; });
+         contains(known, second, &Effect::name);
 }
 
 // Empty: not at all.
@@ -99,9 +97,7 @@ Result<std::vector<EffectCandidate>> Proposals::candidates(
   }
   std::vector<EffectCandidate> sorted;
   for (auto& [effect, candidate] : best) sorted.push_back(std::move(candidate));
-  std::stable_sort(
-      sorted.begin(), sorted.end(),
-      [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; });
+  std::ranges::stable_sort(sorted, std::ranges::greater{}, &EffectCandidate::gain);
   return sorted;
 }
 
@@ -135,8 +131,7 @@ bool Proposals::is_new(const std::vector<Signature>& first,
   }
   if (candidate.gain > kSecondShare * explained) return true;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    std::vector<const Signature*> others;
-    for (const Signature& s : first) others.push_back(&s);
+    std::vector<const Signature*> others = mapped(first, [](const Signature& s) { return &s; });
     for (std::size_t j = 0; j < chosen.size(); ++j) {
       if (j != i) others.push_back(&chosen[j].signature);
     }

@@ -78,7 +78,6 @@ class Proposals {
 
   // Data that are as if the predictions of what was chosen were linear in its columns.
   void restart(const Eigen::VectorXd& data) { base_.restart(data); }
-  // Only the nuisances are explained.
   const Regression& nothing_explained() const { return base_; }
   // The nuisances and these signatures.
   Regression with(const std::vector<const Signature*>& signatures) const;

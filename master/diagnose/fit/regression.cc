@@ -1,6 +1,5 @@
 #include "master/diagnose/fit/regression.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 
 #include "common/math/algebra.h"

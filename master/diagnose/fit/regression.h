@@ -38,7 +38,6 @@ class Regression {
   Eigen::VectorXd explained(const Eigen::MatrixXd& columns) const;
   // Other data for the same basis.
   void restart(const Eigen::VectorXd& data);
-  // Takes `columns` into the basis.
   void add(const Eigen::MatrixXd& columns);
 
   // What is left of the data: one entry a row (prior rows omitted).

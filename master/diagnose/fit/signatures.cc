@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/fit/slopes.h"
@@ -31,7 +32,7 @@ std::vector<Probe> probes_of(const EffectDiagnosis& row, const Study& study) {
 
 bool has_effect(const Study& study, const std::string& name) {
   const std::span<const Effect> known = study.table->effects();
-  return std::any_of(known.begin(), known.end(), [&](const Effect& e) { return e.name == name; });
+  return contains(known, name, &Effect::name);
 }
 
 bool one_condition(const Study& study) {
@@ -65,8 +66,7 @@ Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns
     for (MotionKind kind : {MotionKind::kStraight, MotionKind::kTurn, MotionKind::kWide}) {
       Eigen::VectorXd part = columns.col(k);
       for (std::size_t i = 0; i < study.size(); ++i) {
-        if (study.cells[study.trials[i].cell].kind != kind)
-          part.segment<3>(static_cast<Eigen::Index>(3 * i)).setZero();
+        if (study.cells[study.trials[i].cell].kind != kind) part.segment<3>(3 * i).setZero();
       }
       if (part.squaredNorm() > 0) parts.push_back(std::move(part));
     }
@@ -104,8 +104,7 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
       std::move(all.begin(), all.end(), std::back_inserter(marks));
     }
     const ProbedSlopes slopes = ProbedSlopes(probed).subspan(from, count);
-    if (slopes.empty() ||
-        std::any_of(slopes.begin(), slopes.end(), [](const auto& d) { return d.empty(); })) {
+    if (slopes.empty() || std::ranges::any_of(slopes, [](const auto& d) { return d.empty(); })) {
       continue;
     }
     if (row->signatures == nullptr) {
@@ -120,15 +119,14 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
   const bool only_reach = one_condition(study);
   std::erase_if(found, [&](const Signature& s) {
     return (only_reach && study.subject->effects->row(s.effect).changes_reach) ||
-           std::find(excluded.begin(), excluded.end(), s.effect) != excluded.end();
+           contains(excluded, s.effect);
   });
   return found;
 }
 
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
                                                 const std::vector<Patch>& places) {
-  std::vector<Pose> ends_without;
-  for (const ResidualTrial& trial : study.trials) ends_without.push_back(trial.X_WP);
+  std::vector<Pose> ends_without = mapped(study.trials, &ResidualTrial::X_WP);
   ASSIGN_OR_RETURN(const auto without, slope_point(predictor, study, study.base, ends_without));
   std::vector<PredictionRequest> requests;
   std::vector<std::map<std::string, double>> values;

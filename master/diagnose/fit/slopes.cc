@@ -33,10 +33,9 @@ Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const O
   }
   SlopePoint coarse{at, {}, headings};
   coarse.at[row] = rate;
-  auto there = predictor.attempt({{coarse.at, {}, headings}});
-  if (!there) return there.error();
-  if (!there->front()) return SlopePoint{at, ends};
-  coarse.ends = std::move(*there->front());
+  ASSIGN_OR_RETURN(auto there, predictor.attempt({{coarse.at, {}, headings}}));
+  if (!there.front()) return SlopePoint{at, ends};
+  coarse.ends = std::move(*there.front());
   return coarse;
 }
 
@@ -135,9 +134,8 @@ Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor
 }
 
 Eigen::MatrixXd stack(const std::vector<Eigen::VectorXd>& columns) {
-  Eigen::MatrixXd all(columns.front().size(), static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    all.col(static_cast<Eigen::Index>(k)) = columns[k];
+  Eigen::MatrixXd all(columns.front().size(), columns.size());
+  for (std::size_t k = 0; k < columns.size(); ++k) all.col(k) = columns[k];
   return all;
 }
 

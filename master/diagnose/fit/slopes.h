@@ -21,7 +21,6 @@ struct SlopeRequest {
 // Change of every trial's end a unit of the parameter.
 using Slope = std::vector<Eigen::Vector3d>;
 
-// Where changes of the motion are simulated, and the ends there.
 struct SlopePoint {
   Overrides at;
   std::vector<Pose> ends;

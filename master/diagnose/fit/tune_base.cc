@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
@@ -36,13 +37,12 @@ std::vector<CellResidual> cell_residuals(const Study& study) {
   std::vector<CellResidual> cells(study.cells.size());
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& t = study.trials[i];
-    for (int k = 0; k < 3; ++k)
-      values[t.cell][static_cast<std::size_t>(k)].push_back(t.residual[k]);
+    for (int k = 0; k < 3; ++k) values[t.cell][k].push_back(t.residual[k]);
     cells[t.cell].trial = i;
     cells[t.cell].count += 1;
   }
   for (std::size_t c = 0; c < cells.size(); ++c) {
-    for (int k = 0; k < 3; ++k) cells[c].median[k] = median(values[c][static_cast<std::size_t>(k)]);
+    for (int k = 0; k < 3; ++k) cells[c].median[k] = median(values[c][k]);
   }
   return cells;
 }
@@ -106,7 +106,7 @@ Eigen::MatrixXd log_slopes(const std::vector<Slope>& slopes, std::size_t trial,
                            Eigen::Index parameters) {
   Eigen::MatrixXd j(3, parameters);
   for (Eigen::Index k = 0; k < parameters; ++k) {
-    j.col(k) = slopes[static_cast<std::size_t>(k)][trial];
+    j.col(k) = slopes[k][trial];
   }
   return j;
 }
@@ -116,10 +116,8 @@ BaseNormal normal_of_cells(const Study& study, const std::vector<Slope>& slopes,
                            Eigen::Index p, int round, bool* of_all) {
   BaseNormal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
   const std::vector<CellResidual> cells = cell_residuals(study);
-  std::vector<double> turns;
-  for (const CellResidual& cell : cells) {
-    turns.push_back(both[cell.trial][2]);
-  }
+  std::vector<double> turns =
+      mapped(cells, [&](const CellResidual& cell) { return both[cell.trial][2]; });
   const double most = most_turn(turns, round);
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const CellResidual& cell = cells[c];
@@ -164,8 +162,7 @@ BaseNormal normal_of_trials(const Study& study, const std::vector<Slope>& slopes
     Eigen::MatrixXd rows(3, p + q);
     rows.leftCols(p) = study.whitener[i] * log_slopes(slopes, i, p);
     for (Eigen::Index k = 0; k < q; ++k) {
-      rows.col(p + k) =
-          misfits[static_cast<std::size_t>(k)].segment<3>(static_cast<Eigen::Index>(3 * i));
+      rows.col(p + k) = misfits[k].segment<3>(3 * i);
     }
     const Eigen::Vector3d z = study.whitener[i] * study.trials[i].residual;
     const double weight = soft_weight(z);
@@ -186,7 +183,7 @@ TuningStep tuning_step(const Problem& problem, const std::vector<BaseParameter>&
                              ? normal_of_trials(*study, slopes, p, round, &taken.of_all)
                              : normal_of_cells(*study, slopes, both, p, round, &taken.of_all);
   for (Eigen::Index k = 0; k < p; ++k) {
-    const BaseParameter& parameter = parameters[static_cast<std::size_t>(k)];
+    const BaseParameter& parameter = parameters[k];
     const double precision = 1 / (parameter.prior_log_sd * parameter.prior_log_sd);
     const double away = std::log(study->base[parameter.row] / problem.values[parameter.row]);
     normal(k, k) += precision;
@@ -194,7 +191,7 @@ TuningStep tuning_step(const Problem& problem, const std::vector<BaseParameter>&
   }
   const Eigen::VectorXd step = solve_symmetric(normal, right).head(p);
   for (Eigen::Index k = 0; k < p; ++k) {
-    const std::size_t row = parameters[static_cast<std::size_t>(k)].row;
+    const std::size_t row = parameters[k].row;
     const auto [lower, upper] = tunable(problem.table()[row]);
     double& value = study->base[row];
     value *= std::exp(std::clamp(step[k], -kLargestLogStep, kLargestLogStep));
@@ -228,9 +225,8 @@ Result<std::vector<Slope>> base_slopes(Predictor& predictor,
 Result<std::vector<Pose>> predict_base(Predictor& predictor, const Overrides& simulated,
                                        Study* study) {
   for (int half = 0;; ++half) {
-    auto ends = predictor.attempt({{study->base, {}}});
-    if (!ends) return ends.error();
-    if (ends->front()) return std::move(*ends->front());
+    ASSIGN_OR_RETURN(auto ends, predictor.attempt({{study->base, {}}}));
+    if (ends.front()) return std::move(*ends.front());
     if (simulated.empty() || half == kMostBaseHalvings) {
       return predictor.failed("the base model cannot be simulated");
     }
@@ -244,15 +240,13 @@ Result<std::vector<Pose>> predict_base(Predictor& predictor, const Overrides& si
 // than full.  The parabola through three points, at its end.
 Result<Slope> slope_of_duties(Predictor& predictor, const Overrides& at,
                               const std::vector<Pose>& ends) {
-  const auto less = predictor.attempt_slower(at, 1 - kGainStep);
-  if (!less) return less.error();
-  const auto least = predictor.attempt_slower(at, 1 - 2 * kGainStep);
-  if (!least) return least.error();
-  if (!*less || !*least) return predictor.failed("the base model cannot be driven a little slower");
+  ASSIGN_OR_RETURN(const auto less, predictor.attempt_slower(at, 1 - kGainStep));
+  ASSIGN_OR_RETURN(const auto least, predictor.attempt_slower(at, 1 - 2 * kGainStep));
+  if (!less || !least) return predictor.failed("the base model cannot be driven a little slower");
   Slope slope;
   for (std::size_t i = 0; i < ends.size(); ++i) {
     slope.push_back(
-        (local_difference(ends[i], (**least)[i]) - 4 * local_difference(ends[i], (**less)[i])) /
+        (local_difference(ends[i], (*least)[i]) - 4 * local_difference(ends[i], (*less)[i])) /
         (2 * kGainStep));
   }
   return slope;

@@ -3,11 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "common/base/constants.h"
 #include "common/math/statistics.h"
-#include "common/pose/pose.h"
 #include "master/diagnose/fit/free_commands.h"
 
 namespace gapfarm {
@@ -116,10 +114,9 @@ void PatchSketch::lay_grid() {
       }
     }
   }
-  marks_.resize(static_cast<Eigen::Index>(3 * study_.size()),
-                static_cast<Eigen::Index>(marks.size()));
+  marks_.resize(3 * study_.size(), marks.size());
   for (std::size_t k = 0; k < marks.size(); ++k) {
-    marks_.col(static_cast<Eigen::Index>(k)) = marks[k];
+    marks_.col(k) = marks[k];
   }
 }
 
@@ -168,7 +165,7 @@ std::vector<PatchSketch::Shifts> PatchSketch::shifts(double ratio) const {
     for (std::size_t set = 0; set < shifts.size(); ++set) {
       Eigen::Vector4d friction = Eigen::Vector4d::Ones();
       for (std::size_t c = 0; c < 4; ++c) {
-        if ((set >> c & 1) != 0) friction[static_cast<Eigen::Index>(c)] = ratio;
+        if ((set >> c & 1) != 0) friction[c] = ratio;
       }
       shifts[set] = twist(left, right, friction) - even;
     }
@@ -207,11 +204,11 @@ Eigen::Vector3d PatchSketch::shift_of(const DrivenPath& driven, const Patch& pat
 }
 
 Eigen::VectorXd PatchSketch::column(const Patch& patch, const std::vector<Shifts>& shifts) const {
-  Eigen::VectorXd column = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * study_.size()));
+  Eigen::VectorXd column = Eigen::VectorXd::Zero(3 * study_.size());
   for (std::size_t i = 0; i < study_.size(); ++i) {
     const Eigen::Vector3d shift = shift_of(driven_[i], patch, shifts[study_.trials[i].cell]);
     if (shift.isZero(0)) continue;
-    column.segment<3>(static_cast<Eigen::Index>(3 * i)) = study_.whitener[i] * shift;
+    column.segment<3>(3 * i) = study_.whitener[i] * shift;
   }
   study_.drop_ignored(column);
   return column;
@@ -229,11 +226,10 @@ void PatchSketch::climb(const Regression& explained, Place* place) const {
       better = false;
       for (int k = 0; k < 8; ++k) {
         Place next = *place;
-        const std::size_t at =
-            std::find(kRatios.begin(), kRatios.end(), next.patch[3]) - kRatios.begin();
+        const std::size_t at = std::ranges::find(kRatios, next.patch[3]) - kRatios.begin();
         std::size_t to = at;
         if (k < 6) {
-          next.patch[static_cast<std::size_t>(k / 2)] += k % 2 == 0 ? step_m : -step_m;
+          next.patch[k / 2] += k % 2 == 0 ? step_m : -step_m;
         } else {
           to = k == 6 ? at + 1 : at - 1;  // below 0 it is large
           if (to >= kRatios.size()) continue;
@@ -266,7 +262,7 @@ std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained,
   };
   for (std::size_t k = 0; k < grid_.size(); ++k) {
     if (!is_wanted(grid_[k])) continue;
-    places.push_back({grid_[k], squares[static_cast<Eigen::Index>(k)]});
+    places.push_back({grid_[k], squares[k]});
   }
   const auto best_first = [](const Place& a, const Place& b) { return a.squares > b.squares; };
   std::stable_sort(places.begin(), places.end(), best_first);

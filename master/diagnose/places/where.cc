@@ -10,7 +10,6 @@
 
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
-#include "master/diagnose/places/where_covariates.h"
 
 namespace gapfarm {
 namespace {
@@ -126,7 +125,7 @@ class Looker {
           (best->covariate == nullptr ? mean_column(s) : columns_of(*best->covariate, s)) *
           best->test.coefficients;
       for (std::size_t i = 0; i < s.trials.size(); ++i) {
-        left_[s.trials[i]][s.component] -= s.sign[i] * fitted[static_cast<Eigen::Index>(i)];
+        left_[s.trials[i]][s.component] -= s.sign[i] * fitted[i];
         spent_[s.trials[i]][s.component] += best->test.dimensions / double(s.trials.size());
       }
     }
@@ -148,9 +147,8 @@ class Looker {
     std::set<int> seen;
     for (std::size_t i = 0; i < s.trials.size(); ++i) {
       const std::size_t trial = s.trials[i];
-      const auto at = static_cast<Eigen::Index>(i);
-      v.scale[at] = sd(trial, s.component);
-      v.u[at] = s.sign[i] * left_[trial][s.component] / v.scale[at];
+      v.scale[i] = sd(trial, s.component);
+      v.u[i] = s.sign[i] * left_[trial][s.component] / v.scale[i];
       v.commands.push_back(static_cast<int>(trials_[trial].command));
       v.groups.push_back(static_cast<int>(trials_[trial].cell));
       seen.insert(v.groups.back());
@@ -178,19 +176,18 @@ class Looker {
   }
 
   Eigen::MatrixXd columns_of(const WhereCovariate& covariate, const Selection& s) const {
-    Eigen::MatrixXd columns(static_cast<Eigen::Index>(s.trials.size()), covariate.columns.cols());
+    Eigen::MatrixXd columns(s.trials.size(), covariate.columns.cols());
     for (std::size_t i = 0; i < s.trials.size(); ++i) {
-      columns.row(static_cast<Eigen::Index>(i)) =
-          covariate.columns.row(static_cast<Eigen::Index>(s.trials[i])) *
-          (covariate.with_motion ? motion(s, s.trials[i]) : 1.0);
+      columns.row(i) = covariate.columns.row(s.trials[i]) *
+                       (covariate.with_motion ? motion(s, s.trials[i]) : 1.0);
     }
     return columns;
   }
 
   Eigen::MatrixXd mean_column(const Selection& s) const {
-    Eigen::MatrixXd column(static_cast<Eigen::Index>(s.trials.size()), 1);
+    Eigen::MatrixXd column(s.trials.size(), 1);
     for (std::size_t i = 0; i < s.trials.size(); ++i) {
-      column(static_cast<Eigen::Index>(i), 0) = s.along_motion ? motion(s, s.trials[i]) : 1.0;
+      column(i, 0) = s.along_motion ? motion(s, s.trials[i]) : 1.0;
     }
     return column;
   }

@@ -1,13 +1,10 @@
 #include "master/diagnose/places/where_covariates.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <functional>
 #include <set>
 #include <utility>
-#include <vector>
 
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
@@ -29,11 +26,10 @@ std::vector<double> middle(std::span<const ResidualTrial> trials) {
 void add_covariate(WhereCovariate covariate, std::size_t trials,
                    const std::function<std::vector<double>(std::size_t)>& values,
                    std::vector<WhereCovariate>* all) {
-  covariate.columns.resize(static_cast<Eigen::Index>(trials),
-                           static_cast<Eigen::Index>(values(0).size()));
+  covariate.columns.resize(trials, static_cast<Eigen::Index>(values(0).size()));
   for (std::size_t i = 0; i < trials; ++i) {
     const std::vector<double> row = values(i);
-    covariate.columns.row(static_cast<Eigen::Index>(i)) =
+    covariate.columns.row(i) =
         Eigen::Map<const Eigen::RowVectorXd>(row.data(), covariate.columns.cols());
   }
   covariate.columns.rowwise() -= covariate.columns.colwise().mean().eval();
@@ -108,16 +104,15 @@ std::vector<WhereCovariate> where_covariates(std::span<const ResidualTrial> tria
 Eigen::VectorXd group_means(const Eigen::VectorXd& values, const Eigen::VectorXd& scale,
                             std::span<const int> groups) {
   const int last = groups.empty() ? -1 : *std::max_element(groups.begin(), groups.end());
-  std::vector<std::pair<double, double>> sums(static_cast<std::size_t>(last + 1));
+  std::vector<std::pair<double, double>> sums(last + 1);
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    auto& [value, weight] = sums[static_cast<std::size_t>(groups[static_cast<std::size_t>(i)])];
+    auto& [value, weight] = sums[static_cast<std::size_t>(groups[i])];
     value += values[i] / scale[i];
     weight += 1 / (scale[i] * scale[i]);
   }
   Eigen::VectorXd means(values.size());
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const auto& [value, weight] =
-        sums[static_cast<std::size_t>(groups[static_cast<std::size_t>(i)])];
+    const auto& [value, weight] = sums[static_cast<std::size_t>(groups[i])];
     means[i] = value / weight / scale[i];
   }
   return means;
@@ -164,7 +159,7 @@ TrendTest trend_test(const Eigen::VectorXd& values, const Eigen::MatrixXd& colum
   const Eigen::VectorXd solved =
       solve_square(basis.leftCols(k).transpose() * used.leftCols(k), along);
   for (Eigen::Index j = 0; j < k; ++j) {
-    test.coefficients[kept[static_cast<std::size_t>(j)]] = solved[j];
+    test.coefficients[kept[j]] = solved[j];
   }
   const double left = (y - test.fitted).squaredNorm() / freedom;
   if (!(left > 0)) {

@@ -1,9 +1,9 @@
 #include "master/diagnose/push/push_geometry.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "common/base/ranges.h"
 #include "common/pose/segment.h"
 
 namespace gapfarm {
@@ -53,10 +53,8 @@ PushGeometry push_geometry(const Piece& piece, const Trial& trial, double finger
   push.p_RC = centroid(piece);
   const Eigen::Vector3d moments = second_moments(piece);
   push.gyration_m = std::sqrt(moments[0] + moments[1]);
-  std::vector<Eigen::Vector2d> corners;
-  for (const Eigen::Vector2d& corner : piece.corners) {
-    corners.push_back(transform(trial.X_WS, corner));
-  }
+  std::vector<Eigen::Vector2d> corners = mapped(
+      piece.corners, [&](const Eigen::Vector2d& corner) { return transform(trial.X_WS, corner); });
   // Between samples the way is straight, and steps shorter than the margin miss nothing.
   const double reach = finger_radius_m + kTouch_m;
   Eigen::Vector2d touch = Eigen::Vector2d::Zero();

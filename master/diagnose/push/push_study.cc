@@ -5,6 +5,7 @@
 #include <set>
 #include <span>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/parameters/push.h"
 #include "common/score/motion_model.h"
@@ -132,8 +133,7 @@ Status measure_retuning(Predictor& predictor, Study* study) {
   for (BaseParameter& p : parameters) p.prior_log_sd = std::max(p.prior_log_sd, 0.5);
   for (const auto& [row, prior] :
        {std::pair{Push::kFingerFriction, 0.3}, std::pair{Push::kGroundFriction, 0.5}}) {
-    const bool known = std::any_of(parameters.begin(), parameters.end(),
-                                   [&](const BaseParameter& p) { return p.row == row_of(row); });
+    const bool known = contains(parameters, row_of(row), &BaseParameter::row);
     if (!known) parameters.push_back({row_of(row), prior});
   }
   std::vector<PredictionRequest> requests;
@@ -192,9 +192,8 @@ Status start_from_grid(Predictor& predictor, Study* study) {
     frictions.insert(frictions.end(), std::begin(kGridFrictions), std::end(kGridFrictions));
   }
   const SupportRows support = support_rows(predictor.problem());
-  const bool factors_tuned =
-      std::any_of(study->base.begin(), study->base.end(),
-                  [&](const auto& entry) { return support.holds(entry.first); });
+  const bool factors_tuned = std::ranges::any_of(
+      study->base, [&](const auto& entry) { return support.holds(entry.first); });
   std::vector<double> factors = {0};  // the config's
   if (factors_tuned) factors.insert(factors.end(), support.grid.begin(), support.grid.end());
   if (frictions.size() * factors.size() == 1) return {};
@@ -225,8 +224,7 @@ Status start_from_grid(Predictor& predictor, Study* study) {
     double sum = 0;
     Overrides at = requests[f * factors.size()].at;
     for (const auto& [piece, own] : costs) {
-      const auto best =
-          static_cast<std::size_t>(std::min_element(own.begin(), own.end()) - own.begin());
+      const auto best = static_cast<std::size_t>(std::ranges::min_element(own) - own.begin());
       sum += own[best];
       const std::size_t to = at.count(support.own(piece)) ? support.own(piece) : support.of_all;
       if (factors[best] > 0 && at.count(to)) at[to] = factors[best];
@@ -291,11 +289,10 @@ Result<Study> make_push_study(const Problem& problem, std::span<const Gene> gene
     study.trials.push_back(t);
   }
   study.sessions = sessions.size();
-  const auto base = base_of(problem, genes, pieces);
-  if (!base) return base.error();
-  study.base_parameters = *base;
+  ASSIGN_OR_RETURN(const auto base, base_of(problem, genes, pieces));
+  study.base_parameters = base;
   const SupportRows support = support_rows(problem);
-  for (const BaseParameter& p : *base) {
+  for (const BaseParameter& p : base) {
     const bool own = p.row > support.of_all && support.holds(p.row);
     study.base[p.row] =
         own ? support.value(problem, p.row - support.own(0)) : problem.values[p.row];

@@ -86,7 +86,6 @@ std::vector<WhereCovariate> covariates(std::span<const ResidualTrial> trials,
   return all;
 }
 
-// How much of what effects look at varies in a log.
 struct PushVariety {
   std::size_t pieces = 0, directions = 0, sides = 0;
   double width_m = 0;

@@ -84,7 +84,6 @@ struct Where {
   std::string text;       // one plain sentence
 };
 
-// One row of the screening table.
 struct Screened {
   std::string effect;
   double gain = 0;       // log-likelihood gained by the best strength, nats over all trials
@@ -99,7 +98,6 @@ struct Screened {
   std::vector<std::pair<std::string, double>> detectable_from = {};
 };
 
-// What the final model's residuals still depend on, or not.
 struct ResidualCheck {
   std::string covariate;
   double log10_p = 0;

@@ -10,8 +10,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr int kVersion = 1;
 constexpr std::array<std::pair<Verdict, const char*>, 5> kVerdicts = {
     {{Verdict::kEffect, "effect"},
@@ -27,121 +25,95 @@ const char* bound_name(BoundHit hit) {
 constexpr Severity kSeverities[] = {Severity::kNote, Severity::kWarning, Severity::kUnusable};
 
 // Every row of the file, in the order of its fields.
-constexpr auto kEstimate = [](auto& v, auto& e) {
-  v.field("value", e.value);
-  v.field("lo", e.lo);
-  v.field("hi", e.hi);
-  v.field("unit", e.unit);
-  v.if_any("bound", e.bound);
-  v.if_any("width_over_bound", e.width_over_bound);
-  v.if_any("sd", e.sd);
+constexpr auto kEstimate = [](auto& v, auto& row) {
+  FIELDS(value, lo, hi, unit);
+  IF_ANY(bound, width_over_bound, sd);
 };
-constexpr auto kSessionGainRow = [](auto& v, auto& s) {
-  v.field("session", s.session);
-  v.field("gain", s.gain);
-  v.field("lo", s.lo);
-  v.field("hi", s.hi);
+constexpr auto kSessionGainRow = [](auto& v, auto& row) { FIELDS(session, gain, lo, hi); };
+constexpr auto kEffect = [](auto& v, auto& row) {
+  FIELDS(name, aliases);
+  LATER(alias_reason);
+  FIELDS(confidence);
+  v.by_key("parameters", row.parameters, &Estimate::key, kEstimate);
+  FIELDS(gap_before, gap_after);
+  IF_ANY(axis, position_mm_before, heading_mrad_before, position_mm_after, heading_mrad_after);
+  FIELDS(closed, closed_lo, closed_hi);
+  v.list_if_any("sessions", row.sessions, kSessionGainRow);
+  LATER(text);
 };
-constexpr auto kEffect = [](auto& v, auto& e) {
-  v.field("name", e.name);
-  v.field("aliases", e.aliases);
-  v.later("alias_reason", e.alias_reason);
-  v.field("confidence", e.confidence);
-  v.by_key("parameters", e.parameters, &Estimate::key, kEstimate);
-  v.field("gap_before", e.gap_before);
-  v.field("gap_after", e.gap_after);
-  v.if_any("axis", e.axis);
-  v.if_any("position_mm_before", e.position_mm_before);
-  v.if_any("heading_mrad_before", e.heading_mrad_before);
-  v.if_any("position_mm_after", e.position_mm_after);
-  v.if_any("heading_mrad_after", e.heading_mrad_after);
-  v.field("closed", e.closed);
-  v.field("closed_lo", e.closed_lo);
-  v.field("closed_hi", e.closed_hi);
-  v.list_if_any("sessions", e.sessions, kSessionGainRow);
-  v.later("text", e.text);
+constexpr auto kFigures = [](auto& v, auto& row) {
+  FIELDS(tuned);
+  v.field("final", row.final_);
+  FIELDS(floor);
 };
-constexpr auto kFigures = [](auto& v, auto& figures) {
-  v.field("tuned", figures.tuned);
-  v.field("final", figures.final_);
-  v.field("floor", figures.floor);
+constexpr auto kWhere = [](auto& v, auto& row) {
+  FIELDS(command, component, kind, covariate);
+  LATER(size);
+  FIELDS(share, p, text);
 };
-constexpr auto kWhere = [](auto& v, auto& w) {
-  v.field("command", w.command);
-  v.field("component", w.component);
-  v.field("kind", w.kind);
-  v.field("covariate", w.covariate);
-  v.later("size", w.size);
-  v.field("share", w.share);
-  v.field("p", w.p);
-  v.field("text", w.text);
+constexpr auto kScreened = [](auto& v, auto& row) {
+  FIELDS(effect, gain, p);
+  LATER(estimate, alias_set);
+  IF_ANY(held_out, held_out_se);
+  LATER(note);
+  v.by_key("detectable_from", row.detectable_from);
 };
-constexpr auto kScreened = [](auto& v, auto& s) {
-  v.field("effect", s.effect);
-  v.field("gain", s.gain);
-  v.field("p", s.p);
-  v.later("estimate", s.estimate);
-  v.later("alias_set", s.alias_set);
-  v.if_any("held_out", s.held_out);
-  v.if_any("held_out_se", s.held_out_se);
-  v.later("note", s.note);
-  v.by_key("detectable_from", s.detectable_from);
+constexpr auto kStep = [](auto& v, auto& row) {
+  FIELDS(explained);
+  v.by_key("offered", row.offered);
 };
-constexpr auto kStep = [](auto& v, auto& step) {
-  v.field("explained", step.explained);
-  v.by_key("offered", step.offered);
+constexpr auto kCheck = [](auto& v, auto& row) { FIELDS(covariate, log10_p, excess); };
+constexpr auto kNearMiss = [](auto& v, auto& row) { FIELDS(effects, gain, left, left_on, text); };
+constexpr auto kNext = [](auto& v, auto& row) {
+  FIELDS(text, separates);
+  LATER(trials);
 };
-constexpr auto kCheck = [](auto& v, auto& check) {
-  v.field("covariate", check.covariate);
-  v.field("log10_p", check.log10_p);
-  v.field("excess", check.excess);
+constexpr auto kSanity = [](auto& v, auto& row) {
+  FIELDS(name);
+  v.choice("severity", row.severity, kSeverities, severity_name);
+  FIELDS(text, remedy);
 };
-constexpr auto kNearMiss = [](auto& v, auto& miss) {
-  v.field("effects", miss.effects);
-  v.field("gain", miss.gain);
-  v.field("left", miss.left);
-  v.field("left_on", miss.left_on);
-  v.field("text", miss.text);
+constexpr auto kProvenance = [](auto& v, auto& row) {
+  v.field("label", row.first);
+  v.field("value", row.second);
 };
-constexpr auto kNext = [](auto& v, auto& next) {
-  v.field("text", next.text);
-  v.field("separates", next.separates);
-  v.later("trials", next.trials);
+constexpr auto kTiming = [](auto& v, auto& row) {
+  v.field("stage", row.first);
+  v.field("seconds", row.second);
 };
-constexpr auto kSanity = [](auto& v, auto& f) {
-  v.field("name", f.name);
-  v.choice("severity", f.severity, kSeverities, severity_name);
-  v.field("text", f.text);
-  v.field("remedy", f.remedy);
-};
-constexpr auto kProvenance = [](auto& v, auto& line) {
-  v.field("label", line.first);
-  v.field("value", line.second);
-};
-constexpr auto kTiming = [](auto& v, auto& stage) {
-  v.field("stage", stage.first);
-  v.field("seconds", stage.second);
-};
-constexpr auto kCorrelation = [](auto& v, auto& c) {
-  v.field("a", c.a);
-  v.field("b", c.b);
-  v.field("r", c.r);
-};
+constexpr auto kCorrelation = [](auto& v, auto& row) { FIELDS(a, b, r); };
 constexpr auto kParameter = [](auto& v, auto& row) {
-  v.field("key", row.key);
-  v.field("unit", row.unit);
-  v.if_any("effect", row.effect);
-  v.later("summary", row.summary);
+  FIELDS(key, unit);
+  IF_ANY(effect);
+  LATER(summary);
   v.if_any("tuned", row.before);
   v.field("final", row.after);
-  v.if_any("lo", row.lo);
-  v.if_any("hi", row.hi);
-  v.field("lower", row.lower);
-  v.field("upper", row.upper);
-  v.if_any("choice", row.choice);
+  IF_ANY(lo, hi);
+  FIELDS(lower, upper);
+  IF_ANY(choice);
   std::string hit = bound_name(bound_hit(row));  // for others: it follows from the rest
   v.if_any("at_bound", hit);
-  v.if_any("note", row.note);
+  IF_ANY(note);
+};
+
+// What stands before the gap, and behind it.
+constexpr auto kBeforeGap = [](auto& v, auto& row) {
+  LATER(headline, action, findings);
+  v.list("sanity", row.sanity, kSanity);
+  v.list("effects", row.effects, kEffect);
+};
+constexpr auto kBehindGap = [](auto& v, auto& row) {
+  v.list("parameters", row.parameters, kParameter);
+  v.list("correlations", row.correlations, kCorrelation);
+  v.list("where", row.where, kWhere);
+  v.list("unexplained", row.unexplained, kWhere);
+  v.list("screening", row.screening, kScreened);
+  v.list("steps", row.steps, kStep);
+  v.list("checks", row.checks, kCheck);
+  v.list("next_experiment", row.next, kNext);
+  LATER(cautions);
+  v.list("provenance", row.provenance, kProvenance);
+  v.list("timing", row.timing_s, kTiming);
 };
 
 void read_gap(const Json& json, Fields& root, Diagnosis& diagnosis) {
@@ -183,25 +155,10 @@ Json summary_json(const Diagnosis& diagnosis) {
   gap.update(FieldWriter::written(diagnosis.gap, kFigures));
   gap["position_mm"] = FieldWriter::written(diagnosis.position_mm, kFigures);
   gap["heading_mrad"] = FieldWriter::written(diagnosis.heading_mrad, kFigures);
-  Json summary = {{"version", kVersion},
-                  {"verdict", verdict_name(diagnosis.verdict)},
-                  {"headline", diagnosis.headline},
-                  {"action", diagnosis.action},
-                  {"findings", diagnosis.findings},
-                  {"sanity", sanity_json(diagnosis.sanity)},
-                  {"effects", FieldWriter::list(diagnosis.effects, kEffect)},
-                  {"gap", std::move(gap)},
-                  {"parameters", parameters_json(diagnosis.parameters)},
-                  {"correlations", FieldWriter::list(diagnosis.correlations, kCorrelation)},
-                  {"where", FieldWriter::list(diagnosis.where, kWhere)},
-                  {"unexplained", FieldWriter::list(diagnosis.unexplained, kWhere)},
-                  {"screening", FieldWriter::list(diagnosis.screening, kScreened)},
-                  {"steps", FieldWriter::list(diagnosis.steps, kStep)},
-                  {"checks", FieldWriter::list(diagnosis.checks, kCheck)},
-                  {"next_experiment", FieldWriter::list(diagnosis.next, kNext)},
-                  {"cautions", diagnosis.cautions},
-                  {"provenance", FieldWriter::list(diagnosis.provenance, kProvenance)},
-                  {"timing", FieldWriter::list(diagnosis.timing_s, kTiming)}};
+  Json summary = {{"version", kVersion}, {"verdict", verdict_name(diagnosis.verdict)}};
+  summary.update(FieldWriter::written(diagnosis, kBeforeGap));
+  summary["gap"] = std::move(gap);
+  summary.update(FieldWriter::written(diagnosis, kBehindGap));
   if (diagnosis.residual) summary["residual"] = residual_json(*diagnosis.residual);
   if (!diagnosis.nearest.empty()) {
     summary["nearest"] = FieldWriter::list(diagnosis.nearest, kNearMiss);
@@ -247,23 +204,9 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
     root.complain("verdict", json["verdict"], "effect, none, unknown, effect+unknown or unusable");
   }
   if (!error.empty()) return Error{error};
-  root.later("headline", diagnosis.headline);
-  root.later("action", diagnosis.action);
-  root.later("findings", diagnosis.findings);
-  root.list("effects", diagnosis.effects, kEffect);
+  kBeforeGap(root, diagnosis);
   read_gap(json, root, diagnosis);
-  root.list("sanity", diagnosis.sanity, kSanity);
-  root.list("where", diagnosis.where, kWhere);
-  root.list("unexplained", diagnosis.unexplained, kWhere);
-  root.list("screening", diagnosis.screening, kScreened);
-  root.list("next_experiment", diagnosis.next, kNext);
-  root.list("steps", diagnosis.steps, kStep);
-  root.list("checks", diagnosis.checks, kCheck);
-  root.later("cautions", diagnosis.cautions);
-  root.list("provenance", diagnosis.provenance, kProvenance);
-  root.list("timing", diagnosis.timing_s, kTiming);
-  root.list("parameters", diagnosis.parameters, kParameter);
-  root.list("correlations", diagnosis.correlations, kCorrelation);
+  kBehindGap(root, diagnosis);
   root.list("nearest", diagnosis.nearest, kNearMiss);
   if (!error.empty()) return Error{error};
   if (json.contains("residual")) {

@@ -1,12 +1,12 @@
 // diagnosis.json (docs/formats.md): written for other programs, read back by `gapfarm report`.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 #include "master/diagnose/result/diagnosis.h"
 
 namespace gapfarm {
@@ -19,32 +19,31 @@ std::string to_json(const Diagnosis& diagnosis);
 // null reads as NaN.  Errors name the field, what was found and what was expected.
 Result<Diagnosis> parse_diagnosis(std::string_view text);
 
-// Everything but the trials.
-nlohmann::ordered_json summary_json(const Diagnosis& diagnosis);
+Json summary_json(const Diagnosis& diagnosis);
 
 // [{"name", "severity", "text", "remedy"}, ...]
-nlohmann::ordered_json sanity_json(const std::vector<SanityFinding>& findings);
+Json sanity_json(const std::vector<SanityFinding>& findings);
 
 // {"columns": ["session", ...], "rows": [[...], ...]}: a table, since there are many trials.
 // `digits` significant digits a number; 0: as many as it takes to read back the same bits.
-nlohmann::ordered_json trials_json(const Diagnosis& diagnosis, int digits = 0);
+Json trials_json(const Diagnosis& diagnosis, int digits = 0);
 
 // The inverse of trials_json().
-Result<std::vector<DiagnosedTrial>> parse_trials(const nlohmann::ordered_json& table,
+Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
                                                  const std::vector<ShownCovariate>& shown);
 
 // How the pictures describe the trials, where not of driven commands; and back.
-nlohmann::ordered_json pictures_json(const Diagnosis& diagnosis);
-Status read_pictures(const nlohmann::ordered_json& pictures, Diagnosis* diagnosis);
+Json pictures_json(const Diagnosis& diagnosis);
+Status read_pictures(const Json& pictures, Diagnosis* diagnosis);
 
 // The correction without a cause; and back.
-nlohmann::ordered_json residual_json(const FoundResidual& residual);
-Status read_residual(const nlohmann::ordered_json& json, std::optional<FoundResidual>* residual);
+Json residual_json(const FoundResidual& residual);
+Status read_residual(const Json& json, std::optional<FoundResidual>* residual);
 
-nlohmann::ordered_json parameters_json(const std::vector<ParameterRow>& rows);
+Json parameters_json(const std::vector<ParameterRow>& rows);
 
 // Drives beside their simulations (paths as [t s, x m, y m, heading rad] from the start); and back.
-nlohmann::ordered_json drives_json(const std::vector<ShownDrive>& drives);
-Status read_drives(const nlohmann::ordered_json& json, std::vector<ShownDrive>* drives);
+Json drives_json(const std::vector<ShownDrive>& drives);
+Status read_drives(const Json& json, std::vector<ShownDrive>* drives);
 
 }  // namespace gapfarm

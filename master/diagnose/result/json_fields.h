@@ -1,9 +1,4 @@
-// JSON field by field.  A row is described once, as a function of a visitor and the row:
-//
-//   constexpr auto kCheck = [](auto& v, auto& row) { v.field("p", row.p); v.later("note",
-//   row.note); };
-//
-// FieldWriter writes it, Fields reads it back, with an error that names the place.
+// Reads what a FieldWriter wrote (common/json/fields.h), with an error that names the place.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +17,7 @@ namespace gapfarm {
 // Reads fields of one object; the first thing that does not fit is kept as a sentence.
 class Fields {
  public:
-  Fields(const nlohmann::ordered_json& json, std::string path, std::string& error)
+  Fields(const Json& json, std::string path, std::string& error)
       : json_(json), path_(std::move(path)), error_(error) {
     if (!json.is_object()) complain("", json, "an object");
   }
@@ -70,7 +65,6 @@ class Fields {
               numbers.emplace_back(item_key, 0).second);
     });
   }
-  // Rows in a list, where there is one.
   template <class Row, class Describe>
   void list(const char* key, std::vector<Row>& rows, const Describe& describe) {
     for_each(key, [&](const auto& item, const std::string& path, const std::string&) {
@@ -88,7 +82,7 @@ class Fields {
   template <class Each>
   void for_each(const char* key, const Each& each) {
     if (!json_.is_object() || !json_.contains(key)) return;
-    const nlohmann::ordered_json& list = json_[key];
+    const Json& list = json_[key];
     if (!list.is_array() && !list.is_object()) return complain(key, list, "a list");
     std::size_t index = 0;
     for (const auto& [item_key, item] : list.items()) {
@@ -99,13 +93,13 @@ class Fields {
   }
 
   std::string name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
-  void complain(const std::string& key, const nlohmann::ordered_json& found, const char* expected) {
+  void complain(const std::string& key, const Json& found, const char* expected) {
     fail(name(key) + " is " + json_text(found).substr(0, 60) + ", expected " + expected);
   }
   std::string& error() { return error_; }
 
  private:
-  void convert(const char* key, const nlohmann::ordered_json& json, double& field) {
+  void convert(const char* key, const Json& json, double& field) {
     if (json.is_null()) {
       field = std::numeric_limits<double>::quiet_NaN();
     } else if (json.is_number()) {
@@ -114,28 +108,27 @@ class Fields {
       complain(key, json, "a number");
     }
   }
-  void convert(const char* key, const nlohmann::ordered_json& json, std::optional<double>& field) {
+  void convert(const char* key, const Json& json, std::optional<double>& field) {
     convert(key, json, field.emplace());
   }
-  void convert(const char* key, const nlohmann::ordered_json& json, std::uint64_t& field) {
+  void convert(const char* key, const Json& json, std::uint64_t& field) {
     if (!json.is_number_unsigned()) return complain(key, json, "a count");
     field = json.get<std::uint64_t>();
   }
-  void convert(const char* key, const nlohmann::ordered_json& json, std::string& field) {
+  void convert(const char* key, const Json& json, std::string& field) {
     if (!json.is_string()) return complain(key, json, "a text");
     field = json.get<std::string>();
   }
-  void convert(const char* key, const nlohmann::ordered_json& json,
-               std::vector<std::string>& field) {
+  void convert(const char* key, const Json& json, std::vector<std::string>& field) {
     if (!json.is_array()) return complain(key, json, "a list of texts");
     field.clear();
-    for (const nlohmann::ordered_json& item : json) convert(key, item, field.emplace_back());
+    for (const Json& item : json) convert(key, item, field.emplace_back());
   }
   void fail(const std::string& sentence) {
     if (error_.empty()) error_ = "diagnosis.json: " + sentence;
   }
 
-  const nlohmann::ordered_json& json_;
+  const Json& json_;
   std::string path_;
   std::string& error_;
 };

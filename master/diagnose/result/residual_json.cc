@@ -2,14 +2,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "common/json/json.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json rows_json(const Eigen::MatrixXd& matrix) {
   Json rows = Json::array();
@@ -41,7 +38,7 @@ Json term_json(const ResidualTerm& term) {
 bool read_rows(const Json& json, Eigen::MatrixXd* rows) {
   if (!json.is_array() || json.empty() || !json.front().is_array()) return false;
   const std::size_t columns = json.front().size();
-  rows->resize(static_cast<Eigen::Index>(json.size()), static_cast<Eigen::Index>(columns));
+  rows->resize(json.size(), columns);
   for (std::size_t k = 0; k < json.size(); ++k) {
     if (!json[k].is_array() || json[k].size() != columns) return false;
     for (std::size_t j = 0; j < columns; ++j) {
@@ -77,8 +74,7 @@ Status read_term(const Json& json, const std::string& path, ResidualTerm* term) 
   }
   const auto known = residual_covariates();
   for (const std::string& name : covariates) {
-    const auto row = std::find_if(known.begin(), known.end(),
-                                  [&](const ResidualCovariate& c) { return c.name == name; });
+    const auto row = std::ranges::find(known, name, &ResidualCovariate::name);
     if (row == known.end()) return wrong;
     term->covariates.push_back(static_cast<std::size_t>(row - known.begin()));
   }
@@ -120,16 +116,8 @@ bool read_chances(const Json& outliers, std::vector<double>* chances) {
   return true;
 }
 
-constexpr auto kFound = [](auto& v, auto& found) {
-  v.field("text", found.text);
-  v.field("gained", found.gained);
-  v.field("gained_lo", found.gained_lo);
-  v.field("gained_hi", found.gained_hi);
-  v.field("gap_before", found.gap_before);
-  v.field("gap_after", found.gap_after);
-  v.field("closed", found.closed);
-  v.field("closed_lo", found.closed_lo);
-  v.field("closed_hi", found.closed_hi);
+constexpr auto kFound = [](auto& v, auto& row) {
+  FIELDS(text, gained, gained_lo, gained_hi, gap_before, gap_after, closed, closed_lo, closed_hi);
 };
 
 }  // namespace

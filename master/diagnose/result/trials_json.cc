@@ -1,20 +1,18 @@
 // Trials as a table, drives with their paths, and how the pictures describe both.
 
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "common/base/text.h"
 #include "common/json/json.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // Calls visit(name, field) for every column in order, so that writing and reading cannot disagree.
 // `Trial` is DiagnosedTrial or const DiagnosedTrial.
@@ -67,9 +65,7 @@ DiagnosedTrial blank_trial() {
 
 double rounded(double value, int digits) {
   if (digits <= 0 || !std::isfinite(value)) return value;
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return std::strtod(text, nullptr);
+  return std::strtod(formatted("%.*g", digits, value).c_str(), nullptr);
 }
 
 // Whether `json` fits `field`; sets it when so.
@@ -110,17 +106,8 @@ bool read_path(const Json& json, std::vector<PathSample>* path) {
   return true;
 }
 
-constexpr auto kShown = [](auto& v, auto& shown) {
-  v.field("key", shown.key);
-  v.field("label", shown.label);
-  v.field("matches", shown.matches);
-};
-constexpr auto kLabels = [](auto& v, auto& labels) {
-  v.field("ends", labels.ends);
-  v.field("residuals", labels.residuals);
-  v.field("x", labels.x);
-  v.field("y", labels.y);
-};
+constexpr auto kShown = [](auto& v, auto& row) { FIELDS(key, label, matches); };
+constexpr auto kLabels = [](auto& v, auto& row) { FIELDS(ends, residuals, x, y); };
 
 }  // namespace
 

@@ -196,11 +196,9 @@ Eigen::VectorXd Competition::unexplained(const infer::Model& model) const {
 }
 
 Eigen::MatrixXd Competition::in_all_trials(const Eigen::MatrixXd& rows) const {
-  Eigen::MatrixXd all =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * study_.size()), rows.cols());
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(3 * study_.size(), rows.cols());
   for (std::size_t k = 0; k < scope_.index.size(); ++k) {
-    all.middleRows<3>(static_cast<Eigen::Index>(3 * scope_.index[k])) =
-        rows.middleRows<3>(static_cast<Eigen::Index>(3 * k));
+    all.middleRows<3>(3 * scope_.index[k]) = rows.middleRows<3>(3 * k);
   }
   return all;
 }

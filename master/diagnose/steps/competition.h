@@ -18,8 +18,7 @@ class Competition {
   // hypotheses.  REQUIRES: all outlive it.
   Competition(const DiagnosisRequest& of, const Study& study, const Evidence& evidence,
               const std::vector<Signature>& first, BaseParameters base);
-  Competition(const Competition&) = delete;
-  Competition& operator=(const Competition&) = delete;
+  Competition& operator=(Competition&&) = delete;
 
   const infer::Forward& forward() const { return scope_.forward; }
   const infer::Observations& observations() const { return scope_.observations; }
@@ -30,7 +29,6 @@ class Competition {
   std::vector<infer::Hypothesis> of_rows(const std::set<std::string>& without) const;
   // From where a first-order fit has its parameters.
   infer::Hypothesis of_mark(const EffectCandidate& mark, const Regression& explained) const;
-  // The values of the effect's own parameters at a model.
   std::map<std::string, double> values_of(const std::string& effect,
                                           const infer::Model& model) const;
   // Whitened rows of all trials, as if nothing were explained but by the model's parameters.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/digits.h"
 #include "common/math/laws.h"
@@ -44,7 +45,7 @@ std::vector<std::string> aliases_of(const DiagnosisRequest& of, const std::strin
     }
   }
   for (const char* constant : of.subject.effects->row(effect).aliases) {
-    if (std::find(aliases.begin(), aliases.end(), constant) == aliases.end()) {
+    if (!contains(aliases, constant)) {
       aliases.emplace_back(constant);
     }
   }
@@ -113,10 +114,9 @@ class Selection {
       if (!more) break;
     }
     if (Status s = measure_reach(); !s) return s.error();
-    std::stable_sort(found_->chosen.begin(), found_->chosen.end(),
-                     [](const ChosenEffect& a, const ChosenEffect& b) {
-                       return a.candidate.gain > b.candidate.gain;
-                     });
+    std::ranges::stable_sort(found_->chosen, [](const ChosenEffect& a, const ChosenEffect& b) {
+      return a.candidate.gain > b.candidate.gain;
+    });
     return std::move(*found_);
   }
 
@@ -204,7 +204,6 @@ class Selection {
     }
   }
 
-  // What later ones made worthless leaves again.
   Status drop_idle() {
     std::size_t first = competition_.base().coordinates();
     for (std::size_t k = 0; k + 1 < found_->chosen.size();) {
@@ -281,14 +280,13 @@ Status relinearise(const DiagnosisRequest& of, Screening* screening) {
   Explanation& named = screening->found;
   const std::vector<EffectCandidate> effects = candidates_of(named.chosen);
   ASSIGN_OR_RETURN(auto fit, estimate(of, *screening->catalogue, named, effects, 2));
-  const auto there = relinearised_at(of, named.study(), fit, effects);
-  if (!there) return there.error();
+  ASSIGN_OR_RETURN(const auto there, relinearised_at(of, named.study(), fit, effects));
   named.estimates = std::move(fit);
   emit_fit(of, *named.estimates);
-  if (there->columns.empty()) return {};
-  screening->catalogue->restart(there->data);
+  if (there.columns.empty()) return {};
+  screening->catalogue->restart(there.data);
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {
-    named.chosen[k].candidate.signature.columns = there->columns[k];
+    named.chosen[k].candidate.signature.columns = there.columns[k];
   }
   return {};
 }
@@ -325,14 +323,13 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Competition
 
 Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
   const Evidence& evidence = *found.evidence;
-  const auto configured = of.subject.make_study(of.problem, of.options.genes);
-  if (!configured) return configured.error();
+  ASSIGN_OR_RETURN(const auto configured, of.subject.make_study(of.problem, of.options.genes));
   Study study = evidence.study;
   if (of.subject.base_moves) {
     // By the noise that readings are configured to have: what the tuned base misses by must not
     // pass for noise.
     study.trust.clear();
-    study.use_noise(configured->noise);
+    study.use_noise(configured.noise);
   }
   const bool moves = of.subject.base_moves || (found.frees_base && found.tuned_alone.empty());
   const Competition competition(of, study, evidence, found.first,
@@ -344,7 +341,7 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
     if (Status s = screen_alone(of, found, &screening); !s) return s.error();
   }
   Selection selection(of, study, competition, screening.catalogue.get(), found.first,
-                      configured->base);
+                      configured.base);
   ASSIGN_OR_RETURN(auto selected, selection.run());
   if (screening.catalogue == nullptr) screening.rows = std::move(selected.rows);
   screening.steps = std::move(selected.steps);
@@ -355,9 +352,7 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
   const std::shared_ptr<const Evidence> before = found.evidence;
   screening.found = std::move(found);
   if (moves) {
-    if (Status s = move_to(of, selected, competition, before->study, &screening); !s) {
-      return s.error();
-    }
+    RETURN_IF_ERROR(move_to(of, selected, competition, before->study, &screening));
   } else if (!screening.found.chosen.empty()) {
     if (Status s = relinearise(of, &screening); !s) return s.error();
   }

@@ -17,7 +17,6 @@ constexpr double kTailsWorthFitting = 3.6;
 // of a real robot gain 13.
 constexpr double kLeastTailGain = 10;
 
-// Noise with tails, and what a perfect prediction scores under it.
 struct Tails {
   std::vector<NoiseEstimate> noise;  // one a nested fit
   double perfect = 0;
@@ -65,7 +64,6 @@ std::vector<NestedFit> with_tails(const DiagnosisRequest& of, const Tails& tails
   return nested;
 }
 
-// The last of the nested fits, and slips foreseen.
 std::vector<double> scores_with_slips(const DiagnosisRequest& of, const Explanation& named,
                                       const NestedFit& last,
                                       const std::vector<std::size_t>& folds) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/effects/catalogue.h"
 #include "common/math/digits.h"
 #include "common/math/statistics.h"
@@ -39,10 +40,8 @@ std::vector<NearMiss> nearest(const DiagnosisRequest& of, const Screening& scree
                               const std::vector<Leftover>& left) {
   const Evidence& evidence = *screening.found.evidence;
   std::vector<NearMiss> nearest;
-  std::vector<std::string> together;
-  for (const ChosenEffect& c : screening.found.chosen) {
-    together.push_back(c.candidate.signature.effect);
-  }
+  std::vector<std::string> together = mapped(
+      screening.found.chosen, [](const ChosenEffect& c) { return c.candidate.signature.effect; });
   if (!together.empty()) nearest.push_back(near_miss(of, together, nats, left));
   for (std::size_t k = 0; k < std::min(kNearestAlone, screening.alone.size()); ++k) {
     const EffectCandidate& alone = screening.alone[k];
@@ -108,8 +107,7 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
       leftovers(without_it, {{"what its repeats have in common",
                               nuisances.rightCols(study.misfit_columns), study.misfit_expected}});
   left.insert(left.end(), common.begin(), common.end());
-  std::stable_sort(left.begin(), left.end(),
-                   [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });
+  std::ranges::stable_sort(left, {}, &Leftover::log10_p);
   return left;
 }
 

@@ -1,8 +1,8 @@
 // The base, the noise and the evidence that later steps look at.
 
-#include <algorithm>
 #include <span>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
@@ -25,14 +25,13 @@ Result<std::vector<Eigen::Vector3d>> end_velocities(const DiagnosisRequest& of,
   constexpr double kStep_s = 0.02;
   Overrides shorter = study.base;
   shorter[of.table().row("timing_offset.offset")] = -kStep_s;
-  const auto ends = of.predictor.attempt({{shorter, {}}});
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, of.predictor.attempt({{shorter, {}}}));
   std::vector<Eigen::Vector3d> velocity;
-  if (!ends->front()) {
+  if (!ends.front()) {
     of.predictor.exclude("pose_latency");
     return velocity;
   }
-  for (const Eigen::Vector3d& d : differences(study, *ends->front(), kStep_s)) {
+  for (const Eigen::Vector3d& d : differences(study, *ends.front(), kStep_s)) {
     velocity.push_back(-d);
   }
   return velocity;
@@ -43,8 +42,7 @@ Result<std::vector<Eigen::Vector3d>> end_velocities(const DiagnosisRequest& of,
 Result<double> latency_from_rest(const DiagnosisRequest& of, const Study& study,
                                  const LatencyFit& latency,
                                  const std::vector<Eigen::Vector3d>& velocity) {
-  std::vector<CommandSpec> commands;
-  for (const Cell& cell : study.cells) commands.push_back(cell.command);
+  std::vector<CommandSpec> commands = mapped(study.cells, &Cell::command);
   const auto paths = of.predictor.paths(study.base, commands, kPathInterval_s);
   if (!paths && paths.error().code == ErrorCode::kSimulation) return latency.latency_s;
   if (!paths) return paths.error();
@@ -73,8 +71,7 @@ Result<Explanation> put_late_readings_right(const DiagnosisRequest& of, Explanat
     const std::vector<Eigen::Vector3d> marks = late_marks(study, partial.latency, velocity);
     for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].late = marks[i];
     study.noise = as_logged.noise;
-    if (Status s = of.subject.tune(of.predictor, of.options.keep_base, &study); !s)
-      return s.error();
+    RETURN_IF_ERROR(of.subject.tune(of.predictor, of.options.keep_base, &study));
     ASSIGN_OR_RETURN(auto measured, measure(of, study));
     partial.evidence = std::make_shared<const Evidence>(std::move(measured));
     auto faster = end_velocities(of, partial.study());
@@ -147,10 +144,7 @@ Explanation without(const Explanation& all, const std::vector<bool>& ignored) {
 
 bool DiagnosisRequest::excluded(const std::string& effect) const {
   const std::span<const Effect> known = table().effects();
-  return std::find(options.excluded.begin(), options.excluded.end(), effect) !=
-             options.excluded.end() ||
-         std::none_of(known.begin(), known.end(),
-                      [&](const Effect& e) { return e.name == effect; });
+  return contains(options.excluded, effect) || !contains(known, effect, &Effect::name);
 }
 
 bool DiagnosisRequest::looks_for(const std::string& effect, Looks look) const {
@@ -175,10 +169,9 @@ Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanati
   const Study& study = partial.study();
   if ((of.subject.looks & kLooksForLateReadings) == 0 || study.gaps.size() < kFewestGaps)
     return partial;
-  const auto velocity = end_velocities(of, study);
-  if (!velocity) return velocity.error();
-  if (velocity->empty()) return partial;
-  partial.latency = fit_latency(study, *velocity);
+  ASSIGN_OR_RETURN(const auto velocity, end_velocities(of, study));
+  if (velocity.empty()) return partial;
+  partial.latency = fit_latency(study, velocity);
   if (partial.latency.gain < kLeastLatencyGain) return partial;
   if (of.excluded("pose_latency")) {
     partial.odd_readings =
@@ -186,7 +179,7 @@ Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanati
         "explain them was looked for.";
     return partial;
   }
-  auto right = put_late_readings_right(of, std::move(partial), *velocity);
+  auto right = put_late_readings_right(of, std::move(partial), velocity);
   if (!right) return right;
   Signature s;
   s.effect = "pose_latency";

@@ -4,7 +4,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "master/diagnose/correction/outlier_fit.h"
@@ -43,7 +42,6 @@ Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisa
 // The same without what these trials say.
 Explanation without(const Explanation& all, const std::vector<bool>& ignored);
 
-// Readings that came late are found and put right.
 Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial);
 // Where paths were logged they say more of a lag than rest poses do, and have the last word.
 Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial);
@@ -93,7 +91,6 @@ Judgement with_warning(Judgement judged, SanityFinding finding);
 // As if nothing had been looked for.
 Judgement with_base_warning(const DiagnosisRequest& of, const Evidence& measured, Judgement judged);
 
-// A chosen effect that is to be dropped, and why.
 struct Worthless {
   std::size_t effect = 0;
   std::string why;

@@ -1,7 +1,6 @@
 // The fits behind the figures.
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 #include "common/base/try.h"
@@ -13,9 +12,7 @@
 namespace gapfarm::steps {
 namespace {
 
-Eigen::MatrixXd no_nuisances(const Study& study) {
-  return Eigen::MatrixXd(static_cast<Eigen::Index>(3 * study.size()), 0);
-}
+Eigen::MatrixXd no_nuisances(const Study& study) { return Eigen::MatrixXd(3 * study.size(), 0); }
 
 // `scored_in`: by its noise, where the fit had another.
 NestedFit nested_fit(const DiagnosisRequest& of, std::string name, JointFit fit,
@@ -123,7 +120,6 @@ bool explains_bounds(const Refit& refit) {
          base_on_bounds(named.study(), refit.nested.back().fit.at).empty();
 }
 
-// The base alone is what is left to report.
 Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, Refit refit,
                           std::optional<SanityFinding> missing,
                           const std::vector<std::size_t>& folds) {

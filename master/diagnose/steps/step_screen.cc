@@ -1,6 +1,5 @@
 // What the catalogue offers, and what of it the log calls for.
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/base/try.h"
@@ -14,7 +13,6 @@
 namespace gapfarm::steps {
 namespace {
 
-// Rows of the screening table, a candidate each.
 std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evidence,
                                const std::vector<EffectCandidate>& candidates) {
   const ParameterTable& table = of.table();
@@ -73,8 +71,7 @@ Result<Screening> choose_without_slips(const DiagnosisRequest& of, Screening scr
   std::vector<bool> ignored = found.study().ignored;
   ignored.resize(found.study().size(), false);
   for (std::size_t i = 0; i < ignored.size(); ++i) {
-    const bool slipped =
-        z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm() > kSlippedSquared;
+    const bool slipped = z.segment<3>(3 * i).squaredNorm() > kSlippedSquared;
     if (slipped && (kept.empty() || !kept[i])) ignored[i] = true;
   }
   found = without(found, ignored);

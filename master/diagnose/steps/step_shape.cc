@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -36,10 +37,9 @@ std::string percent_text(double share) { return plain_number(std::round(100 * sh
 
 // "each command's shift by duration and greater duty, in the robot's axes"
 std::string term_text(const ResidualTerm& term) {
-  std::vector<std::string> labels;
-  for (const std::size_t row : term.covariates) {
-    labels.emplace_back(residual_covariates()[row].label);
-  }
+  std::vector<std::string> labels = mapped(term.covariates, [](const std::size_t row) {
+    return std::string(residual_covariates()[row].label);
+  });
   const std::string by = listed(labels);
   if (term.frame == ResidualFrame::kReadings) return "a shift of every reading by its " + by;
   if (term.frame == ResidualFrame::kMotion) return "shares of the motion by " + by;
@@ -53,9 +53,8 @@ ResidualField in_world(ResidualField field, const Eigen::Vector2d& origin) {
   for (ResidualTerm& term : field) {
     for (std::size_t j = 0; j < term.covariates.size(); ++j) {
       const std::string_view name = residual_covariates()[term.covariates[j]].name;
-      const auto column = static_cast<Eigen::Index>(j);
-      if (name == "x") term.centres.col(column).array() += origin.x();
-      if (name == "y") term.centres.col(column).array() += origin.y();
+      if (name == "x") term.centres.col(j).array() += origin.x();
+      if (name == "y") term.centres.col(j).array() += origin.y();
     }
   }
   return field;
@@ -66,8 +65,7 @@ std::string residual_sentence(const FoundResidual& found) {
     return "Corrections of what is left were tried, smooth ones and of single outlier drives; none "
            "helps significantly on trials that no fit saw, so none is kept.";
   }
-  std::vector<std::string> terms;
-  for (const ResidualTerm& term : found.correction.field) terms.push_back(term_text(term));
+  std::vector<std::string> terms = mapped(found.correction.field, term_text);
   if (found.correction.outliers) terms.push_back(outlier_text(*found.correction.outliers));
   std::string text;
   for (const std::string& term : terms) text += (text.empty() ? "" : "; ") + term;
@@ -89,7 +87,6 @@ struct TriedShape {
   std::vector<double> chances;  // of every trial to be an outlier
 };
 
-// What a smooth correction makes of scores and noise.
 void predict_beside(const DiagnosisRequest& of, const Refit& refit, const Residuals& after,
                     Study* beside, TriedShape* tried) {
   const Explanation& named = refit.judged.named;
@@ -119,7 +116,6 @@ OutlierLesson lesson_about(const ResidualData& data, const JointFit& reported_fi
   return lesson;
 }
 
-// Each model with the noise that it leaves.
 TriedShape try_shape(const DiagnosisRequest& of, const Refit& refit, std::size_t k) {
   const JointFit& last = refit.nested[k].fit;
   const JointFit& reported_fit = refit.final_fit ? *refit.final_fit : last;

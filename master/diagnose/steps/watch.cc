@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/math/digits.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -28,8 +29,7 @@ std::string misses_text(double position_squares, double heading_squares, std::si
 }
 
 std::vector<Eigen::Vector3d> residuals_of(const Study& study) {
-  std::vector<Eigen::Vector3d> residuals;
-  for (const ResidualTrial& trial : study.trials) residuals.push_back(trial.residual);
+  std::vector<Eigen::Vector3d> residuals = mapped(study.trials, &ResidualTrial::residual);
   return residuals;
 }
 
@@ -115,8 +115,7 @@ void emit_candidates(const DiagnosisRequest& of, const std::vector<EffectCandida
   if (!watched(of) || candidates.empty()) return;
   std::vector<const EffectCandidate*> best;
   for (const EffectCandidate& c : candidates) best.push_back(&c);
-  std::stable_sort(best.begin(), best.end(),
-                   [](const auto* a, const auto* b) { return a->gain > b->gain; });
+  std::ranges::stable_sort(best, [](const auto* a, const auto* b) { return a->gain > b->gain; });
   Finding finding;
   finding.about = "what the catalogue offers";
   finding.text = fmt::format(
@@ -131,7 +130,6 @@ void emit_candidates(const DiagnosisRequest& of, const std::vector<EffectCandida
   of.options.on_finding(std::move(finding));
 }
 
-// Sizes of the effects, as far as they have been fitted together.
 void emit_fit(const DiagnosisRequest& of, const JointFit& fit) {
   if (!watched(of)) return;
   Finding finding{"effects and their sizes", "", {"parameter", "value and standard error"}, {}};
@@ -139,7 +137,7 @@ void emit_fit(const DiagnosisRequest& of, const JointFit& fit) {
   for (const FittedParameter& fitted : fit.parameters) {
     const Parameter& row = of.table()[fitted.row];
     if (row.effect.empty()) continue;
-    if (std::find(names.begin(), names.end(), row.effect) == names.end()) {
+    if (!contains(names, row.effect)) {
       names.push_back(row.effect);
     }
     const double value = fitted.value + of.frame_of(row.key, fit.at);
@@ -190,7 +188,6 @@ void emit_verdict(const DiagnosisRequest& of, const Judgement& judged) {
   of.options.on_finding(std::move(finding));
 }
 
-// On trials that the fits did not see.
 void emit_gaps(const DiagnosisRequest& of, const std::vector<NestedFit>& nested) {
   if (!watched(of)) return;
   const double perfect = floor_score(nested.back().study, of.outlier_share());

@@ -10,12 +10,10 @@ namespace gapfarm::steps {
 void emit_base(const DiagnosisRequest& of, const Study& study);
 void emit_noise(const DiagnosisRequest& of, const Study& study);
 void emit_candidates(const DiagnosisRequest& of, const std::vector<EffectCandidate>& candidates);
-// Sizes of the effects, as far as they have been fitted together.
 void emit_fit(const DiagnosisRequest& of, const JointFit& fit);
 void emit_readings(const DiagnosisRequest& of, const Explanation& found);
 void emit_choice(const DiagnosisRequest& of, const Explanation& found, bool has_warnings);
 void emit_verdict(const DiagnosisRequest& of, const Judgement& judged);
-// On trials that the fits did not see.
 void emit_gaps(const DiagnosisRequest& of, const std::vector<NestedFit>& nested);
 
 }  // namespace gapfarm::steps

@@ -258,8 +258,7 @@ Result<BlindReport> run_foreign_check(const std::string& cases, const std::strin
   if (open.empty()) {
     return Error{cases + ": has no CASE/trials.csv" + (code ? " (" + code.message() + ")" : "")};
   }
-  std::sort(open.begin(), open.end(),
-            [](const OpenCase& a, const OpenCase& b) { return a.id < b.id; });
+  std::ranges::sort(open, {}, &OpenCase::id);
   const std::string made_of = fs::weakly_canonical(cases, code).string();
   if (!settings.resume && !goes_on(settings, paths)) {
     RETURN_IF_ERROR(check_fresh(paths));

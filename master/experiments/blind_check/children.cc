@@ -92,8 +92,7 @@ class Crowd {
       close(child.pidfd);
     }
   }
-  Crowd(const Crowd&) = delete;
-  Crowd& operator=(const Crowd&) = delete;
+  Crowd& operator=(Crowd&&) = delete;
 
   std::size_t size() const { return children_.size(); }
   void add(const Child& child) { children_.push_back(child); }

@@ -11,8 +11,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t number,
                                           const CheckPaths& paths,
                                           const DiagnoseSettings& settings) {

@@ -7,13 +7,12 @@
 #include <numbers>
 #include <set>
 
+#include "common/base/text.h"
 #include "common/json/json.h"
 #include "master/diagnose/effect_diagnosis.h"
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
@@ -56,17 +55,11 @@ Family family_of(const ReportedEffect& effect) {
 }
 
 std::string names_of(const Reported& reported) {
-  std::string text;
-  for (const ReportedEffect& effect : reported.effects)
-    text += (text.empty() ? "" : "+") + effect.name;
+  std::string text = joined(reported.effects, "+", &ReportedEffect::name);
   return text.empty() ? reported.verdict : reported.verdict + " " + text;
 }
 
-std::string names_of(const Truth& truth) {
-  std::string text;
-  for (const TrueEffect& effect : truth.effects) text += (text.empty() ? "" : "+") + effect.name;
-  return text;
-}
+std::string names_of(const Truth& truth) { return joined(truth.effects, "+", &TrueEffect::name); }
 
 Judgement judge_effects(const Truth& truth, const Reported& reported) {
   const std::string what = names_of(truth);
@@ -218,8 +211,7 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) 
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<Coverage> all;
   for (const TrueEffect& effect : truth.effects) {
-    const auto named = std::find_if(reported.effects.begin(), reported.effects.end(),
-                                    [&](const ReportedEffect& s) { return s.name == effect.name; });
+    const auto named = std::ranges::find(reported.effects, effect.name, &ReportedEffect::name);
     const Effect* entry = catalogue_entry(effect.name);
     if (named == reported.effects.end() || !entry) continue;
     const bool neutral = does_nothing(*entry, effect);

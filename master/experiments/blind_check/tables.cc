@@ -2,58 +2,56 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-template <class... Values>
-std::string formatted(const char* format, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
-
 // A rate as a row: label, wanted, share with interval, counts.
 struct RateRow {
+  std::string key;  // in JSON
   std::string label;
   std::string wanted;
   Rate rate;
+  std::optional<std::string> level = {};  // of one of several rates of this key
 };
 
 // With what DIAGNOSIS asks of each.
 std::vector<RateRow> rate_rows(const Tally& sum) {
-  std::vector<RateRow> rows;
-  rows.push_back({"all cases right", "", sum.right});
+  std::vector<RateRow> rows = {{"right", "all cases right", "", sum.right}};
   for (const auto& [level, rate] : sum.singles_right) {
     const std::string wanted = level == "clear" ? ">= 95 %" : level == "subtle" ? ">= 70 %" : "";
-    rows.push_back({"single " + level + " effects: first or alias right", wanted, rate});
+    rows.push_back({"singles_right", "single " + level + " effects: first or alias right", wanted,
+                    rate, level});
   }
   for (const auto& [level, rate] : sum.singles_first) {
-    rows.push_back({"single " + level + " effects: the true name first", "", rate});
+    rows.push_back(
+        {"singles_first", "single " + level + " effects: the true name first", "", rate, level});
   }
-  rows.push_back({"nulls called none", ">= 95 %", sum.null_none});
-  rows.push_back({"nulls with an effect named (false alarms)", "", sum.false_alarms});
-  rows.push_back({"effects outside the catalogue called unknown", ">= 85 %", sum.outside_unknown});
-  rows.push_back(
-      {"... of these, model.toml closes half of the truth's", ">= 79 %", sum.outside_closed});
-  rows.push_back({"pairs right", ">= 80 %", sum.pairs_right});
-  rows.push_back({"missed effects that lie below what their log shows", "", sum.missed_below});
-  rows.push_back({"parameters within their 90 % interval", "85 to 95 %", sum.covered});
-  rows.push_back({"... of these, strengths", "", sum.strengths_covered});
-  rows.push_back({"... of these, places, directions and the like", "", sum.places_covered});
-  rows.push_back({"... by the interval of the fit alone", "88 to 92 %", sum.fits_covered});
-  rows.push_back(
-      {"intervals of fits 0.9 to 1.3 times as wide as the bound", ">= 90 %", sum.fits_at_bound});
-  rows.push_back({"promised shrinkage within 0.1 of realised", ">= 90 %", sum.promise_kept});
-  rows.push_back({"diagnoses that failed", "0", sum.failed});
+  const std::vector<RateRow> others = {
+      {"null_none", "nulls called none", ">= 95 %", sum.null_none},
+      {"false_alarms", "nulls with an effect named (false alarms)", "", sum.false_alarms},
+      {"outside_unknown", "effects outside the catalogue called unknown", ">= 85 %",
+       sum.outside_unknown},
+      {"outside_closed", "... of these, model.toml closes half of the truth's", ">= 79 %",
+       sum.outside_closed},
+      {"pairs_right", "pairs right", ">= 80 %", sum.pairs_right},
+      {"missed_below", "missed effects that lie below what their log shows", "", sum.missed_below},
+      {"covered", "parameters within their 90 % interval", "85 to 95 %", sum.covered},
+      {"strengths_covered", "... of these, strengths", "", sum.strengths_covered},
+      {"places_covered", "... of these, places, directions and the like", "", sum.places_covered},
+      {"fits_covered", "... by the interval of the fit alone", "88 to 92 %", sum.fits_covered},
+      {"fits_at_bound", "intervals of fits 0.9 to 1.3 times as wide as the bound", ">= 90 %",
+       sum.fits_at_bound},
+      {"promise_kept", "promised shrinkage within 0.1 of realised", ">= 90 %", sum.promise_kept},
+      {"failed", "diagnoses that failed", "0", sum.failed}};
+  rows.insert(rows.end(), others.begin(), others.end());
   return rows;
 }
 
@@ -91,10 +89,9 @@ Json rates_json(const std::map<std::string, Rate>& rates) {
 }
 
 Json reported_json(const Reported& reported) {
-  Json effects = Json::array();
-  for (const ReportedEffect& e : reported.effects) {
-    effects.push_back({{"name", e.name}, {"aliases", e.aliases}});
-  }
+  Json effects = mapped(reported.effects, [&](const ReportedEffect& e) -> Json {
+    return {{"name", e.name}, {"aliases", e.aliases}};
+  });
   return {{"verdict", reported.verdict}, {"effects", effects}};
 }
 
@@ -109,15 +106,11 @@ Json case_json(const ScoredCase& c) {
   json["truth"] = parse_json(format_truth(c.truth));
   json["right"] = c.judgement.right;
   json["why"] = c.judgement.why;
-  Json coverage = Json::array();
-  for (const Coverage& p : c.coverage) {
-    coverage.push_back({{"parameter", p.effect + "." + p.key},
-                        {"truth", p.truth},
-                        {"lo", p.lo},
-                        {"hi", p.hi},
-                        {"strength", p.is_strength},
-                        {"covered", p.covered}});
-  }
+  Json coverage = mapped(c.coverage, [&](const Coverage& p) -> Json {
+    return {
+        {"parameter", p.effect + "." + p.key}, {"truth", p.truth},    {"lo", p.lo}, {"hi", p.hi},
+        {"strength", p.is_strength},           {"covered", p.covered}};
+  });
   json["coverage"] = coverage;
   json["promised"] = number_or_null(c.promised);
   json["realised"] = number_or_null(c.realised);
@@ -258,28 +251,14 @@ std::string format_blind_json(const BlindReport& report) {
   for (const auto& [label, value] : report.provenance) provenance[label] = value;
   Json by_effect = Json::object();
   for (const auto& [effect, rates] : sum.by_effect) by_effect[effect] = rates_json(rates);
-  Json cases = Json::array();
-  for (const ScoredCase& c : report.cases) cases.push_back(case_json(c));
-  Json out_of_reach = Json::array();
-  for (const OutOfReach& o : report.out_of_reach) {
-    out_of_reach.push_back({{"effect", o.effect}, {"level", o.level}, {"size", o.size}});
+  Json cases = mapped(report.cases, case_json);
+  Json out_of_reach = mapped(report.out_of_reach, [&](const OutOfReach& o) -> Json {
+    return {{"effect", o.effect}, {"level", o.level}, {"size", o.size}};
+  });
+  Json rates = {{"right", 0}, {"singles_right", Json::object()}, {"singles_first", Json::object()}};
+  for (const RateRow& row : rate_rows(sum)) {
+    (row.level ? rates[row.key][*row.level] : rates[row.key]) = rate_json(row.rate);
   }
-  const Json rates = {{"right", rate_json(sum.right)},
-                      {"singles_right", rates_json(sum.singles_right)},
-                      {"singles_first", rates_json(sum.singles_first)},
-                      {"null_none", rate_json(sum.null_none)},
-                      {"false_alarms", rate_json(sum.false_alarms)},
-                      {"outside_unknown", rate_json(sum.outside_unknown)},
-                      {"outside_closed", rate_json(sum.outside_closed)},
-                      {"pairs_right", rate_json(sum.pairs_right)},
-                      {"missed_below", rate_json(sum.missed_below)},
-                      {"covered", rate_json(sum.covered)},
-                      {"strengths_covered", rate_json(sum.strengths_covered)},
-                      {"places_covered", rate_json(sum.places_covered)},
-                      {"fits_covered", rate_json(sum.fits_covered)},
-                      {"fits_at_bound", rate_json(sum.fits_at_bound)},
-                      {"promise_kept", rate_json(sum.promise_kept)},
-                      {"failed", rate_json(sum.failed)}};
   const Json json = {{"version", 1},
                      {"provenance", provenance},
                      {"rates", rates},

@@ -10,13 +10,9 @@ namespace {
 
 v1::Task predict_with(const ParameterValues& problem, const ParameterValues& values) {
   v1::Task task;
-  v1::Point* point = task.mutable_predict()->mutable_point();
-  for (std::size_t row = 0; row < values.size(); ++row) {
-    if (values[row] == problem[row]) continue;
-    v1::Override* override = point->add_overrides();
-    override->set_parameter(static_cast<std::uint32_t>(row));
-    override->set_value(values[row]);
-  }
+  const auto overrides = overrides_of(problem, values);
+  task.mutable_predict()->mutable_point()->mutable_overrides()->Add(overrides.begin(),
+                                                                    overrides.end());
   return task;
 }
 

@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
@@ -128,8 +129,7 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
       rest = rest.subspan(part.count);
     }
   }
-  std::vector<ComparedRun> runs;
-  for (Lane& lane : lanes) runs.push_back(std::move(lane.run));
+  std::vector<ComparedRun> runs = mapped(lanes, [](Lane& lane) { return std::move(lane.run); });
   return runs;
 }
 
@@ -148,10 +148,9 @@ CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
     }
     std::vector<Score> scores(requests.size());
     for (const auto& [hash, members] : by_problem) {
-      std::vector<v1::Task> tasks;
-      for (const std::size_t i : members) {
-        tasks.push_back(evaluation_task(requests[i].candidate, requests[i].seed));
-      }
+      std::vector<v1::Task> tasks = mapped(members, [&](const std::size_t i) {
+        return evaluation_task(requests[i].candidate, requests[i].seed);
+      });
       ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
       for (std::size_t k = 0; k < members.size(); ++k) {
         ASSIGN_OR_RETURN(const auto score,

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/trials/select.h"
@@ -45,12 +46,6 @@ std::vector<Pose> mean_of_repeats(const TrialLog& log,
   return ends;
 }
 
-std::string joined(const std::vector<std::string>& tokens) {
-  std::string text;
-  for (const std::string& word : tokens) text += (text.empty() ? "" : " ") + word;
-  return text;
-}
-
 class Crossfit {
  public:
   Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
@@ -66,7 +61,7 @@ class Crossfit {
     TrialLog tests;
     for (const std::vector<std::string>& filters : plan_.tests) {
       ASSIGN_OR_RETURN(const TrialLog test, select_trials(log, filters));
-      RETURN_IF_ERROR(add_set(joined(filters), test, group));
+      RETURN_IF_ERROR(add_set(joined(filters, " "), test, group));
       tests.trials.insert(tests.trials.end(), test.trials.begin(), test.trials.end());
     }
     for (const std::string& key : plan_.sweeps) {
@@ -315,11 +310,8 @@ Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,
   for (const ParameterValues& values : points) {
     v1::Task task;
     task.mutable_predict()->set_means_only(!log_scores);
-    for (std::size_t row = 0; row < values.size(); ++row) {
-      if (values[row] == plain.values[row]) continue;
-      v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
-      to->set_parameter(static_cast<std::uint32_t>(row));
-      to->set_value(values[row]);
+    for (const v1::Override& override : overrides_of(plain.values, values)) {
+      *task.mutable_predict()->mutable_point()->add_overrides() = override;
     }
     tasks.push_back(std::move(task));
   }

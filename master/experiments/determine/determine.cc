@@ -48,7 +48,7 @@ bool takes_part(const ParameterTable& table, const Gene& gene) {
 
 // 1, x_i, x_i x_j (i <= j).
 Eigen::RowVectorXd features(const Eigen::VectorXd& x) {
-  Eigen::RowVectorXd row(static_cast<Eigen::Index>(terms(static_cast<std::size_t>(x.size()))));
+  Eigen::RowVectorXd row(static_cast<Eigen::Index>(terms(x.size())));
   Eigen::Index at = 0;
   row[at++] = 1;
   for (Eigen::Index i = 0; i < x.size(); ++i) row[at++] = x[i];
@@ -69,8 +69,7 @@ struct Quadratic {
 Quadratic fit(const Eigen::MatrixXd& offsets, const Eigen::VectorXd& values,
               const Eigen::VectorXd& widths) {
   const Eigen::Index n = offsets.cols();
-  Eigen::MatrixXd design(offsets.rows(),
-                         static_cast<Eigen::Index>(terms(static_cast<std::size_t>(n))));
+  Eigen::MatrixXd design(offsets.rows(), static_cast<Eigen::Index>(terms(n)));
   for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
     design.row(i) = features(offsets.row(i).transpose());
   }
@@ -102,8 +101,7 @@ void add_genes(const Problem& problem, const Genome& point, const std::vector<st
     GeneDetermined of;
     of.gene = gene;
     of.value = decode_gene(problem.table(), gene, g);
-    const auto i = static_cast<Eigen::Index>(k);
-    of.deviation = std::sqrt(covariance(i, i));
+    of.deviation = std::sqrt(covariance(k, k));
     const double low = std::clamp(g - kNormal_95 * of.deviation, 0.0, 1.0);
     const double high = std::clamp(g + kNormal_95 * of.deviation, 0.0, 1.0);
     of.interval_95 = {decode_gene(problem.table(), gene, low),
@@ -165,7 +163,7 @@ class Study {
     return static_cast<std::size_t>(
         std::ceil(settings_.points_a_term * static_cast<double>(terms(moving_.size()))));
   }
-  std::size_t gene(Eigen::Index k) const { return moving_[static_cast<std::size_t>(k)]; }
+  std::size_t gene(Eigen::Index k) const { return moving_[k]; }
 
   Result<std::vector<double>> nats(const std::vector<Genome>& genomes) {
     auto scores = likelihood_(genomes);
@@ -217,7 +215,7 @@ class Study {
       centre_[k] = std::clamp(point_[gene(k)], widths_[k], 1 - widths_[k]);
     }
     Design design;
-    design.offsets.resize(static_cast<Eigen::Index>(points_of_a_box()), size());
+    design.offsets.resize(points_of_a_box(), size());
     Stream stream(
         {.run_seed = settings_.seed, .purpose = Purpose::kStatistics, .generation = round});
     for (Eigen::Index i = 0; i < design.offsets.rows(); ++i) {
@@ -244,12 +242,12 @@ class Study {
                    " points about the model end well; the quadratic needs " +
                    std::to_string(terms(moving_.size()))};
     }
-    Eigen::MatrixXd offsets(static_cast<Eigen::Index>(usable.size()), size());
+    Eigen::MatrixXd offsets(usable.size(), size());
     Eigen::VectorXd outcomes(offsets.rows());
     for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
-      const Eigen::Index from = usable[static_cast<std::size_t>(i)];
+      const Eigen::Index from = usable[i];
       offsets.row(i) = design.offsets.row(from);
-      outcomes[i] = values[static_cast<std::size_t>(from)];
+      outcomes[i] = values[from];
     }
     return fit(offsets, outcomes, widths_);
   }
@@ -275,10 +273,9 @@ class Study {
             {static_cast<std::size_t>(a), static_cast<std::size_t>(b), r});
       }
     }
-    std::sort(report_.compensations.begin(), report_.compensations.end(),
-              [](const Compensation& x, const Compensation& y) {
-                return std::abs(x.correlation) > std::abs(y.correlation);
-              });
+    std::ranges::sort(report_.compensations, [](const Compensation& x, const Compensation& y) {
+      return std::abs(x.correlation) > std::abs(y.correlation);
+    });
   }
 
   const Problem& problem_;

@@ -276,10 +276,7 @@ Result<std::vector<DrivenRun>> drive_commands(Farm& farm, const Problem& problem
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
   std::vector<DrivenRun> driven;
   for (const v1::TaskResult& result : results) {
-    if (result.outcome() != v1::OK) {
-      return Error{"a run ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                   result.message() + ")"};
-    }
+    RETURN_IF_ERROR(ended_well(result, "a run"));
     DrivenRun run;
     for (std::size_t c = 0; c < commands.size(); ++c) {
       run.push_back({commands[c], from_proto(result.simulate().trials(static_cast<int>(c))).path});

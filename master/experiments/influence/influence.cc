@@ -185,13 +185,6 @@ class Study {
     return std::min(1.0, least_p * static_cast<double>(std::max<std::size_t>(levels.size(), 1)));
   }
 
-  static v1::Override override_of(std::size_t row, double value) {
-    v1::Override override;
-    override.set_parameter(static_cast<std::uint32_t>(row));
-    override.set_value(value);
-    return override;
-  }
-
   std::vector<v1::Override> overrides_of(const Genome& genome) const {
     std::vector<v1::Override> overrides;
     for (std::size_t i = 0; i < genes_.size(); ++i) {

@@ -15,10 +15,8 @@ constexpr int kMostIdleGenerations = 100;
 std::vector<v1::Override> overrides_of(const Problem& problem, const Genome& genome) {
   std::vector<v1::Override> overrides;
   for (std::size_t i = 0; i < genome.size(); ++i) {
-    v1::Override override;
-    override.set_parameter(static_cast<std::uint32_t>(problem.genes[i].row));
-    override.set_value(decode_gene(problem.table(), problem.genes[i], genome[i]));
-    overrides.push_back(std::move(override));
+    const Gene& gene = problem.genes[i];
+    overrides.push_back(override_of(gene.row, decode_gene(problem.table(), gene, genome[i])));
   }
   return overrides;
 }

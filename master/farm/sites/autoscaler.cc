@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "common/base/text.h"
 
 namespace gapfarm {
 namespace {
@@ -11,11 +12,7 @@ namespace {
 // waits: one may be a bad node, and where a node cannot be named or avoided one is enough.
 constexpr unsigned kManyFailures = 3;
 
-std::string seconds_text(double seconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f s", seconds);
-  return text;
-}
+std::string seconds_text(double seconds) { return formatted("%.0f s", seconds); }
 
 // Those that go when `surplus` are not needed: the queue's first, its newest first, then whoever
 // has nothing to do.
@@ -120,9 +117,8 @@ FleetDecision decide(const FleetLook& look, const FleetLimits& limits, double no
     return decision;
   }
   decision.wanted = memory->demand(look, limits, now_s);
-  const auto leaving = static_cast<unsigned>(
-      std::count_if(look.jobs.begin(), look.jobs.end(),
-                    [](const FleetJob& job) { return job.state == JobState::kLeaving; }));
+  const auto leaving =
+      static_cast<unsigned>(std::ranges::count(look.jobs, JobState::kLeaving, &FleetJob::state));
   if (standing - leaving > decision.wanted) {
     decision.cancel = dismissed(look.jobs, standing - leaving - decision.wanted);
     return decision;

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "common/base/text.h"
+
 namespace gapfarm {
 namespace {
 
@@ -56,10 +58,7 @@ Fleet::Fleet(FleetOptions options, Runner run, std::function<void(const std::str
 SiteValues Fleet::values() const {
   const ClusterSite& site = options_.site;
   SiteValues values;
-  std::string worker;
-  for (const std::string& word : options_.worker) {
-    worker += (worker.empty() ? "" : " ") + shell_quoted(word);
-  }
+  std::string worker = joined(options_.worker, " ", shell_quoted);
   values["worker"] = {worker};
   values["name"] = {options_.name};
   values["cores"] = {std::to_string(options_.limits.workers_per_job)};
@@ -356,10 +355,7 @@ std::string Fleet::submission_text(unsigned jobs) const {
   named["last"] = {std::to_string(count - 1)};
   named["index"] = {"0"};
   named["node"] = {site.hosts.empty() ? "" : site.hosts.front()};
-  std::string text;
-  for (const std::string& word : expand(site.submit, named)) {
-    text += (text.empty() ? "" : " ") + shell_quoted(word);
-  }
+  std::string text = joined(expand(site.submit, named), " ", shell_quoted);
   return text + " <<'EOF'\n" + expand(site.script, named) + "EOF\n";
 }
 

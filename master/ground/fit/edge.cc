@@ -123,8 +123,7 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
       }
     }
   }
-  std::sort(lines.begin(), lines.end(),
-            [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::ranges::sort(lines, [](const auto& a, const auto& b) { return a.first > b.first; });
   Eigen::VectorXd best = values;
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < std::min(kClimbed, lines.size()); ++k) {
@@ -170,8 +169,7 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
   // Slopes at the line know the windows over it alone: what moves it more is that others are.
   const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
   Eigen::Matrix3Xd parts(3, kFolds);
-  for (int k = 0; k < kFolds; ++k)
-    parts.col(k) = line_of(folds[static_cast<std::size_t>(k)].values);
+  for (int k = 0; k < kFolds; ++k) parts.col(k) = line_of(folds[k].values);
   const Eigen::Vector3d line = line_of(fit.values), deviation = jackknife_deviation(parts);
   const Eigen::MatrixXd draws = fitter.draws(fit, seed);
   const auto estimate = [&](const char* key, Eigen::Index row, const char* unit) {

@@ -1,65 +1,87 @@
 #include "master/ground/fit/fit_file.h"
 
+#include <fstream>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 namespace gapfarm {
 namespace {
 
-// Values first, then three scales a horizon.
-std::optional<KeptFit> fit_of(const nlohmann::json& line) {
-  if (!line.is_object() || !line.contains("values") || !line.contains("scales")) return {};
-  KeptFit fit;
-  const auto& values = line["values"];
-  const auto& scales = line["scales"];
-  if (!values.is_array() || !scales.is_array() || scales.size() % 3 != 0) return {};
-  const auto number = [](const nlohmann::json& n) { return n.is_number() ? n.get<double>() : 0; };
-  fit.values.resize(static_cast<Eigen::Index>(values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    fit.values[static_cast<Eigen::Index>(i)] = number(values[i]);
+// None where the line has no list of numbers there.
+std::optional<std::vector<double>> numbers(const Json& line, const char* key) {
+  if (!line.is_object() || !line.contains(key) || !line[key].is_array()) return {};
+  std::vector<double> all;
+  for (const Json& number : line[key]) {
+    if (!number.is_number()) return {};
+    all.push_back(number.get<double>());
   }
-  for (std::size_t i = 0; i < scales.size(); i += 3) {
-    fit.scales.emplace_back(number(scales[i]), number(scales[i + 1]), number(scales[i + 2]));
-  }
-  return fit;
+  return all;
+}
+
+// Column by column.
+template <class Matrix>
+std::vector<double> flat(const Matrix& matrix) {
+  return {matrix.data(), matrix.data() + matrix.size()};
 }
 
 }  // namespace
 
-FitFile::FitFile(std::filesystem::path file) : file_(std::move(file)) {
+LineFile::LineFile(std::filesystem::path file) : file_(std::move(file)) {
   std::ifstream from(file_);
-  for (std::string line; std::getline(from, line);) {
-    const auto json = nlohmann::json::parse(line, nullptr, false);
-    const auto fit = fit_of(json);
-    if (fit && json.contains("key") && json["key"].is_string()) {
-      fits_[json["key"].get<std::string>()] = *fit;
-    }
+  for (std::string text; std::getline(from, text);) {
+    const Json line = parse_json(text);
+    if (!line.is_object() || !line.contains("key") || !line["key"].is_string()) continue;
+    lines_[line["key"].get<std::string>()] = text;
   }
-  from.close();
-  to_.open(file_, std::ios::app);
-  to_ << "\n";  // whatever broke off is over
+}
+
+Json LineFile::line(const std::string& key) const {
+  const auto found = lines_.find(key);
+  return found == lines_.end() ? Json() : parse_json(found->second);
+}
+
+void LineFile::add(const std::string& key, Json line) {
+  line["key"] = key;
+  // Begins a line: whatever broke off is over.
+  std::ofstream(file_, std::ios::app) << "\n" + (lines_[key] = json_text(line)) + "\n";
+}
+
+void LineFile::remove() {
+  std::error_code ignored;
+  std::filesystem::remove(file_, ignored);
 }
 
 std::optional<KeptFit> FitFile::find(const std::string& key) {
-  const auto found = fits_.find(key);
-  if (found == fits_.end()) return std::nullopt;
-  return found->second;
+  const Json kept = line(key);
+  const auto values = numbers(kept, "values"), scales = numbers(kept, "scales");
+  if (!values || !scales || scales->size() % 3 != 0) return {};
+  KeptFit fit{Eigen::VectorXd::Map(values->data(), values->size()), {}};
+  for (std::size_t i = 0; i < scales->size(); i += 3) {
+    fit.scales.emplace_back(Eigen::Vector3d::Map(scales->data() + i));
+  }
+  return fit;
 }
 
 void FitFile::keep(const std::string& key, const KeptFit& fit) {
-  nlohmann::json values = nlohmann::json::array(), scales = nlohmann::json::array();
-  for (const double value : fit.values) values.push_back(value);
-  for (const Eigen::Vector3d& s : fit.scales) {
-    for (const double scale : s) scales.push_back(scale);
-  }
-  to_ << nlohmann::json{{"key", key}, {"values", values}, {"scales", scales}}.dump() << "\n";
-  to_.flush();
+  std::vector<double> scales;
+  for (const Eigen::Vector3d& s : fit.scales) scales.insert(scales.end(), s.begin(), s.end());
+  add(key, {{"values", flat(fit.values)}, {"scales", scales}});
 }
 
-void FitFile::remove() {
-  to_.close();
-  std::error_code ignored;
-  std::filesystem::remove(file_, ignored);
+std::optional<Result<OffsetFit>> RunCache::find(const std::string& key) const {
+  const Json kept = line(key);
+  if (kept.is_object() && kept.contains("error") && kept["error"].is_string()) {
+    return Error{kept["error"].get<std::string>()};
+  }
+  const auto values = numbers(kept, "values"), covariance = numbers(kept, "covariance");
+  if (!values || !covariance || covariance->size() != values->size() * values->size()) return {};
+  const auto n = static_cast<Eigen::Index>(values->size());
+  return OffsetFit{Eigen::VectorXd::Map(values->data(), n),
+                   Eigen::MatrixXd::Map(covariance->data(), n, n)};
+}
+
+void RunCache::keep(const std::string& key, const Result<OffsetFit>& fit) {
+  if (!fit) return add(key, {{"error", fit.error().message}});
+  add(key, {{"values", flat(fit->values)}, {"covariance", flat(fit->covariance)}});
 }
 
 }  // namespace gapfarm

@@ -26,13 +26,13 @@ std::vector<std::pair<int, int>> blocks_of_runs(const WindowSet& windows) {
 // Of every block, the fold that it is held out with.  What a run has of its own, such as its
 // clock's offset, is held out together where there are runs enough.
 std::vector<int> folds_of(const WindowSet& windows) {
-  std::vector<int> folds(static_cast<std::size_t>(windows.blocks));
+  std::vector<int> folds(windows.blocks);
   const auto runs = blocks_of_runs(windows);
   const bool whole = runs.size() >= kLeastRunsHeldOut;
   for (std::size_t b = 0; b < folds.size(); ++b) folds[b] = static_cast<int>(b) % kFolds;
   for (std::size_t r = 0; whole && r < runs.size(); ++r) {
     for (int k = 0; k < runs[r].second; ++k) {
-      folds[static_cast<std::size_t>(runs[r].first + k)] = static_cast<int>(r) % kFolds;
+      folds[runs[r].first + k] = static_cast<int>(r) % kFolds;
     }
   }
   return folds;
@@ -41,9 +41,9 @@ std::vector<int> folds_of(const WindowSet& windows) {
 // Of every block.
 std::vector<double> block_gains(const WindowSet& windows, const WindowFit& with,
                                 const WindowFit& without) {
-  std::vector<double> gains(static_cast<std::size_t>(windows.blocks), 0.0);
+  std::vector<double> gains(windows.blocks, 0.0);
   for (std::size_t i = 0; i < with.nats.size(); ++i) {
-    gains[static_cast<std::size_t>(windows.block[i])] += with.nats[i] - without.nats[i];
+    gains[windows.block[i]] += with.nats[i] - without.nats[i];
   }
   return gains;
 }
@@ -82,7 +82,7 @@ WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& ro
   WindowFit whole = fitter.hold(rows, start);
   for (std::size_t i = 0; i < whole.nats.size(); ++i) {
     const auto block = static_cast<std::size_t>(fitter.windows().block[i]);
-    const WindowFit& part = parts[static_cast<std::size_t>(folds[block])];
+    const WindowFit& part = parts[folds[block]];
     whole.nats[i] = part.nats[i];
     whole.residuals[i] = part.residuals[i];
   }
@@ -95,11 +95,10 @@ std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint
   const auto runs = blocks_of_runs(windows);
   const std::size_t drawn = std::max<std::size_t>(1, runs.size() - std::min(spared, runs.size()));
   const double weight = static_cast<double>(runs.size()) / static_cast<double>(drawn);
-  std::vector<std::vector<double>> all(
-      kGroundDraws, std::vector<double>(static_cast<std::size_t>(windows.blocks), 0.0));
+  std::vector<std::vector<double>> all(kGroundDraws, std::vector<double>(windows.blocks, 0.0));
   for (std::vector<double>& times : all) {
     for (std::size_t d = 0; d < drawn; ++d) {
-      const auto [first, count] = runs[static_cast<std::size_t>(stream.below(runs.size()))];
+      const auto [first, count] = runs[stream.below(runs.size())];
       for (int k = 0; k < count; ++k) {
         const auto pick = stream.below(static_cast<std::uint64_t>(count));
         times[static_cast<std::size_t>(first) + static_cast<std::size_t>(pick)] += weight;
@@ -113,7 +112,7 @@ HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const
                           std::uint64_t seed) {
   const std::vector<double> gains = block_gains(windows, with, without);
   std::vector<double> counts(gains.size(), 0.0);
-  for (const int block : windows.block) counts[static_cast<std::size_t>(block)] += 1;
+  for (const int block : windows.block) counts[block] += 1;
   std::vector<double> drawn;
   for (const std::vector<double>& times : draw_blocks(windows, seed, 0)) {
     drawn.push_back(weighted(gains, times) / std::max(1.0, weighted(counts, times)));

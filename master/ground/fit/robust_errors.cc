@@ -111,10 +111,9 @@ std::vector<std::size_t> window_lengths(std::span<const double> durations_s) {
   std::vector<std::size_t> lengths;
   for (const double s : durations_s) {
     const long own = octave(s);
-    const auto nearest =
-        std::min_element(kept.begin(), kept.end(), [own](const auto& a, const auto& b) {
-          return std::abs(a.first - own) < std::abs(b.first - own);
-        });
+    const auto nearest = std::ranges::min_element(kept, [own](const auto& a, const auto& b) {
+      return std::abs(a.first - own) < std::abs(b.first - own);
+    });
     lengths.push_back(nearest->second);
   }
   return lengths;

@@ -139,10 +139,9 @@ Status SimulationFit::climb_again(Climb* climb) {
 Result<std::optional<Climb>> SimulationFit::firm_climb() {
   if (firm_ == start_ && untold_.empty()) return std::optional<Climb>();
   const Hold hold{firm_, 1, kFirmly};
-  auto look = look_at({firm_}, {hold});
-  if (!look) return look.error();
-  if (!look->front()) return std::optional<Climb>();
-  Climb climb{*std::move(look->front()), hold, {}, {}, {}, false};
+  ASSIGN_OR_RETURN(auto look, look_at({firm_}, {hold}));
+  if (!look.front()) return std::optional<Climb>();
+  Climb climb{*std::move(look.front()), hold, {}, {}, {}, false};
   if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
   return std::optional(std::move(climb));
 }
@@ -179,9 +178,8 @@ Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
     chosen.hold = held;
     if (Status s = climb_again(&chosen); !s) return s.error();
   }
-  auto sharp = sharpen(std::move(chosen));
-  if (!sharp) return sharp.error();
-  return weigh_worse(*std::move(sharp));
+  ASSIGN_OR_RETURN(auto sharp, sharpen(std::move(chosen)));
+  return weigh_worse(std::move(sharp));
 }
 
 // As firmly as predicts best what was held out; `cost` is that of it.
@@ -266,10 +264,8 @@ void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStar
   Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(n, n) / (widest * widest);
   for (std::size_t j = 0; j < fitted_rows_.size(); ++j) {
     for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
-      precision(static_cast<Eigen::Index>(fitted_rows_[j]),
-                static_cast<Eigen::Index>(fitted_rows_[k])) +=
-          climb.equations.H(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) /
-          (kFoundSpread * kFoundSpread);
+      precision(fitted_rows_[j], fitted_rows_[k]) +=
+          climb.equations.H(j, k) / (kFoundSpread * kFoundSpread);
     }
     if (!found->kinematic) continue;
     const auto own = static_cast<Eigen::Index>(fitted_rows_[j]);
@@ -297,13 +293,12 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
     firm_.push_back(encode_gene(problem_.table(), gene, grip[gene.row]));
   }
   const Hold hold{start_, 1};
-  auto first = look_at({start_}, {hold});
-  if (!first) return first.error();
+  ASSIGN_OR_RETURN(auto first, look_at({start_}, {hold}));
   SimulatedStart found;
   found.genome = start_;
   found.simulations = simulations_;
-  if (!first->front() || fitted_rows_.empty()) return found;
-  const At begin = *first->front();
+  if (!first.front() || fitted_rows_.empty()) return found;
+  const At begin = *first.front();
   std::vector<Climb> climbs = {{begin, hold, {}, {}, {}, false}};
   if (Status s = step(&climbs.front()); !s) return s.error();
   found.simulations = simulations_;

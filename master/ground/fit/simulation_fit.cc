@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 
 namespace gapfarm {
@@ -65,10 +66,8 @@ Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<
     const v1::TaskResult& result = results[k];
     all.emplace_back();
     if (result.outcome() != v1::OK) continue;
-    std::vector<Pose> ends;
-    for (const v1::Predicted& p : result.predict().predictions()) {
-      ends.push_back(from_proto(p.end()));
-    }
+    std::vector<Pose> ends = mapped(result.predict().predictions(),
+                                    [](const v1::Predicted& p) { return from_proto(p.end()); });
     At at{genomes[k], window_errors(problem_, ends), 0};
     at.nats = errors_->nats(at.ends);
     at.nats -= cost_of(at.genome, holds[holds.size() == 1 ? 0 : k]);
@@ -78,7 +77,7 @@ Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<
 }
 
 double SimulationFit::strength_of(const Hold& hold, std::size_t gene) const {
-  const bool untold = std::find(untold_.begin(), untold_.end(), gene) != untold_.end();
+  const bool untold = contains(untold_, gene);
   return hold.strength * (untold ? hold.untold : 1);
 }
 
@@ -96,17 +95,16 @@ NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) 
   NormalEquations prior{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd(n)};
   for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
     const std::size_t gene = fitted_rows_[k];
-    const auto row = static_cast<Eigen::Index>(k);
-    prior.H(row, row) = strength_of(hold, gene) / (kFreelyMoves * kFreelyMoves);
-    prior.g[row] = prior.H(row, row) * (genome[gene] - hold.start[gene]);
+    prior.H(k, k) = strength_of(hold, gene) / (kFreelyMoves * kFreelyMoves);
+    prior.g[k] = prior.H(k, k) * (genome[gene] - hold.start[gene]);
   }
   return prior;
 }
 
 Eigen::VectorXd SimulationFit::fitted_values(const Genome& genome) const {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(fitted_rows_.size()));
+  Eigen::VectorXd values(fitted_rows_.size());
   for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
-    values[static_cast<Eigen::Index>(k)] = genome[fitted_rows_[k]];
+    values[k] = genome[fitted_rows_[k]];
   }
   return values;
 }
@@ -119,7 +117,7 @@ Genome SimulationFit::with_fitted_values(const Genome& genome,
                                          const Eigen::VectorXd& values) const {
   Genome to = genome;
   for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
-    to[fitted_rows_[k]] = std::clamp(values[static_cast<Eigen::Index>(k)], 0.0, 1.0);
+    to[fitted_rows_[k]] = std::clamp(values[k], 0.0, 1.0);
   }
   return to;
 }
@@ -144,13 +142,12 @@ Status SimulationFit::look_round(Climb* climb) {
   climb->over = std::any_of(beside.begin(), beside.end(), [](const auto& b) { return !b; });
   if (climb->over) return {};
   climb->sloped = at.genome;
-  climb->slopes.assign(at.ends.size(),
-                       Eigen::MatrixXd(3, static_cast<Eigen::Index>(fitted_rows_.size())));
+  climb->slopes.assign(at.ends.size(), Eigen::MatrixXd(3, fitted_rows_.size()));
   for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
     const At& there = *beside[k];
     const double step = there.genome[fitted_rows_[k]] - at.genome[fitted_rows_[k]];
     for (std::size_t i = 0; i < at.ends.size(); ++i) {
-      climb->slopes[i].col(static_cast<Eigen::Index>(k)) = (there.ends[i] - at.ends[i]) / step;
+      climb->slopes[i].col(k) = (there.ends[i] - at.ends[i]) / step;
     }
   }
   return {};

@@ -15,21 +15,18 @@
 
 namespace gapfarm {
 
-// Everything at one genome.
 struct At {
   Genome genome;
   WindowEnds ends;
   double nats = 0;  // of the windows, and of what was moved
 };
 
-// What values are held to, and how firmly.
 struct Hold {
   Genome start;
   double strength = 1;
   double untold = 1;  // times that, of what kinematics have no word for
 };
 
-// One way uphill.
 struct Climb {
   At at;
   Hold hold;

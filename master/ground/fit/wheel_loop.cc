@@ -26,7 +26,6 @@ constexpr double kLeastLoss = 0.02;  // of the fastest command: below it losses 
 constexpr double kLooseGain = 1;     // prior s.d. about 1 and 0, so that one speed does
 constexpr double kLooseLoss = 0.1;   // of the fastest command
 
-// Mean speeds of one wheel over one window, rad/s.
 struct LoopWindow {
   std::size_t block;
   double commanded, measured;
@@ -162,9 +161,8 @@ RunLog driven_by_wheels(RunLog log) {
   log.channels = log.wheel_channels;
   for (LoggedRun& run : log.runs) {
     run.commands = run.wheel_speeds;
-    const auto driving = std::find_if(run.poses.begin(), run.poses.end(), [&](const PoseRow& p) {
-      return p.t_s >= run.poses.front().t_s + kStart_s;
-    });
+    const auto driving = std::ranges::find_if(
+        run.poses, [&](const PoseRow& p) { return p.t_s >= run.poses.front().t_s + kStart_s; });
     run.poses.erase(run.poses.begin(), driving);
   }
   return log;

@@ -101,19 +101,6 @@ std::vector<Eigen::Vector3d> WindowFitter::raw_residuals(const WindowFit& fit) c
   return raw;
 }
 
-std::vector<EndedWindow> WindowFitter::ended_windows(const WindowFit& fit) const {
-  const std::vector<Eigen::Vector3d> raw = raw_residuals(fit);
-  const std::vector<Eigen::MatrixXd> J = slopes(fit);
-  std::vector<EndedWindow> ended;
-  for (std::size_t i = 0; i < raw.size(); ++i) {
-    if (windows_.sense_of(i) != Sense::kPose) continue;
-    ended.push_back({static_cast<std::size_t>(windows_.horizon[i]), *windows_.trials[i].duration_s,
-                     windows_.run_of[i], raw[i],
-                     shapes_.empty() ? J[i] : Eigen::MatrixXd(shapes_[i].inverse() * J[i])});
-  }
-  return ended;
-}
-
 Kinematics WindowFitter::kinematics(const std::vector<FitRow>& rows,
                                     const Eigen::VectorXd& values) const {
   Kinematics at;

@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "common/math/algebra.h"
 #include "master/ground/fit/window_fit.h"
@@ -41,7 +40,7 @@ class TwistReader {
     const auto n = static_cast<Eigen::Index>(robot.channels.size());
     ahead_ = rim_ = Eigen::VectorXd::Zero(n);
     for (Eigen::Index c = 0; c < n; ++c) {
-      const std::string& name = robot.channels[static_cast<std::size_t>(c)];
+      const std::string& name = robot.channels[c];
       const bool left = name.find("left") != std::string::npos;
       const bool right = name.find("right") != std::string::npos;
       if (robot.command == CommandKind::kTwist) {
@@ -75,17 +74,15 @@ class TwistReader {
 
 double delay_of(const WindowFit& fit) {
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-    if (fit.rows[k].row.name == "delay") return fit.values[static_cast<Eigen::Index>(k)];
+    if (fit.rows[k].row.name == "delay") return fit.values[k];
   }
   return 0;
 }
 
 // The first row that acts after a time.
 std::size_t row_after(const CommandedRun& run, double t_s) {
-  const auto before = [](double t, const CommandRow& row) { return t < row.t_s; };
   return static_cast<std::size_t>(
-      std::upper_bound(run.commands.begin(), run.commands.end(), t_s, before) -
-      run.commands.begin());
+      std::ranges::upper_bound(run.commands, t_s, {}, &CommandRow::t_s) - run.commands.begin());
 }
 
 // How much each channel changes from row to row of a stretch of time.
@@ -95,8 +92,7 @@ Eigen::VectorXd variation(const CommandedRun& run, double from_s, double to_s) {
   for (std::size_t k = std::max<std::size_t>(row_after(run, from_s), 1);
        k < run.commands.size() && run.commands[k].t_s < to_s; ++k) {
     for (Eigen::Index c = 0; c < sums.size(); ++c) {
-      const auto i = static_cast<std::size_t>(c);
-      sums[c] += std::abs(run.commands[k].values[i] - run.commands[k - 1].values[i]);
+      sums[c] += std::abs(run.commands[k].values[c] - run.commands[k - 1].values[c]);
     }
   }
   return sums;
@@ -136,9 +132,9 @@ void WindowFitter::weigh_by_commands(const WindowFit& fit) {
   const double delay = delay_of(fit);
   const auto n = static_cast<Eigen::Index>(windows_.trials.size());
   Eigen::VectorXd changes = Eigen::VectorXd::Zero(n), turns(n);
-  Eigen::MatrixXd by_channel(static_cast<Eigen::Index>(robot_.channels.size()), n);
+  Eigen::MatrixXd by_channel(robot_.channels.size(), n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Trial& trial = windows_.trials[static_cast<std::size_t>(i)];
+    const Trial& trial = windows_.trials[i];
     const double from = *trial.t_s - delay - kBefore_s, to = *trial.t_s + *trial.duration_s - delay;
     by_channel.col(i) = variation(windows_.runs[*trial.run], from, to);
     turns[i] = std::abs(wrap_angle(trial.X_WE.theta - trial.X_WS.theta));
@@ -158,7 +154,7 @@ void WindowFitter::weigh_by_commands(const WindowFit& fit) {
       double logs = 0;
       WindowFit weighed = fit;
       for (std::size_t i = 0; i < raw.size(); ++i) {
-        const double factor = factors[static_cast<Eigen::Index>(i)];
+        const double factor = factors[i];
         logs += 3 * use[i] * std::log(factor);
         weighed.residuals[i] = factor * raw[i];
       }
@@ -236,7 +232,7 @@ OffsetFit WindowFitter::fit_with_offsets(WindowFit fit) {
     }
     fit.values += step.head(n);
     for (Eigen::Index k = 0; k < n; ++k) {
-      if (fit.rows[static_cast<std::size_t>(k)].row.positive) {
+      if (fit.rows[k].row.positive) {
         fit.values[k] = std::max(fit.values[k], 0.0);
       }
     }

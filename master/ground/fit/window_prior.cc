@@ -64,7 +64,7 @@ std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vec
   for (std::size_t k = 0; k < rows.size(); ++k) {
     hasher.add(rows[k].row.name).add(rows[k].row.nominal).add(rows[k].row.tolerance);
     hasher.add(rows[k].row.farthest);
-    hasher.add(std::uint64_t{rows[k].free}).add(start[static_cast<Eigen::Index>(k)]);
+    hasher.add(std::uint64_t{rows[k].free}).add(start[k]);
   }
   hasher.add(std::string_view(held_out.data(), held_out.size()));
   return hasher.finish();
@@ -81,16 +81,16 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const FitRow& row = rows[static_cast<std::size_t>(k)];
+    const FitRow& row = rows[k];
     double deviation = row.free ? plausible_error(row.row) : row.row.tolerance;
     if (row.free && row.row.farthest > 0) deviation = row.row.farthest;
     covariance(k, k) = deviation * deviation;
   }
   if (reference_ == nullptr) return covariance.diagonal().cwiseInverse().asDiagonal();
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Eigen::Index a = in_reference(rows[static_cast<std::size_t>(k)]);
+    const Eigen::Index a = in_reference(rows[k]);
     for (Eigen::Index l = 0; a >= 0 && l < n; ++l) {
-      const Eigen::Index b = in_reference(rows[static_cast<std::size_t>(l)]);
+      const Eigen::Index b = in_reference(rows[l]);
       if (b >= 0) covariance(k, l) += reference_->covariance(a, b);
     }
   }
@@ -101,7 +101,7 @@ Eigen::VectorXd WindowFitter::from_middle(const std::vector<FitRow>& rows,
                                           const Eigen::VectorXd& values) const {
   Eigen::VectorXd away = values;
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    away[k] -= rows[static_cast<std::size_t>(k)].row.nominal;
+    away[k] -= rows[k].row.nominal;
   }
   return away;
 }
@@ -159,14 +159,14 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
   for (int d = 0; d < kGroundDraws; ++d) {
     Eigen::VectorXd from = away;
     for (Eigen::Index k = 0; k < n; ++k) {
-      const FitRow& row = fit.rows[static_cast<std::size_t>(k)];
+      const FitRow& row = fit.rows[k];
       const Eigen::Index a = in_reference(row);
       if (a >= 0) from[k] -= reference_->draws(a, d);
       if (a < 0 && row.free) from[k] -= stream.normal() / std::sqrt(P(k, k));
     }
     Eigen::MatrixXd A = P;
     Eigen::VectorXd b = P * from;
-    const std::vector<double>& times = all_times[static_cast<std::size_t>(d)];
+    const std::vector<double>& times = all_times[d];
     for (std::size_t k = 0; k < blocks; ++k) {
       A += times[k] * H[k];
       b += times[k] * g[k];
@@ -180,10 +180,10 @@ Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t see
   const Eigen::MatrixXd drawn = draws(fit, seed);
   Eigen::MatrixX2d bounds(drawn.rows(), 2);
   for (Eigen::Index k = 0; k < drawn.rows(); ++k) {
-    const Eigen::Index a = in_reference(fit.rows[static_cast<std::size_t>(k)]);
-    std::vector<double> row(static_cast<std::size_t>(drawn.cols()));
+    const Eigen::Index a = in_reference(fit.rows[k]);
+    std::vector<double> row(drawn.cols());
     for (Eigen::Index d = 0; d < drawn.cols(); ++d) {
-      row[static_cast<std::size_t>(d)] = drawn(k, d) - (a >= 0 ? reference_->draws(a, d) : 0);
+      row[d] = drawn(k, d) - (a >= 0 ? reference_->draws(a, d) : 0);
     }
     std::sort(row.begin(), row.end());
     // Where the draws lead away from the fit, it has not settled: it is no surer than that.
@@ -200,9 +200,8 @@ std::vector<double> middle_variances(const WindowSet& windows) {
   std::vector<std::vector<double>> variances(3 * static_cast<std::size_t>(windows.horizons));
   for (std::size_t i = 0; i < windows.noise.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto k = static_cast<Eigen::Index>(c);
       variances[3 * static_cast<std::size_t>(windows.horizon[i]) + c].push_back(
-          windows.noise[i](k, k));
+          windows.noise[i](c, c));
     }
   }
   std::vector<double> middle;
@@ -246,7 +245,7 @@ double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
   const std::vector<double> middle = middle_variances(windows_);
   std::vector<double> ratios;
   for (std::size_t k = 0; k < 3 * static_cast<std::size_t>(windows_.lengths); ++k) {
-    const double scale = plain.scales[k / 3][static_cast<Eigen::Index>(k % 3)];
+    const double scale = plain.scales[k / 3][k % 3];
     ratios.push_back(scale * scale / (kMostTooSmall * kMostTooSmall * middle[k]));
   }
   const double lowest = median(ratios) - 1;
@@ -267,6 +266,19 @@ double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
     best = least;
   }
   return best;
+}
+
+std::vector<EndedWindow> WindowFitter::ended_windows(const WindowFit& fit) const {
+  const std::vector<Eigen::Vector3d> raw = raw_residuals(fit);
+  const std::vector<Eigen::MatrixXd> J = slopes(fit);
+  std::vector<EndedWindow> ended;
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    if (windows_.sense_of(i) != Sense::kPose) continue;
+    ended.push_back({static_cast<std::size_t>(windows_.horizon[i]), *windows_.trials[i].duration_s,
+                     windows_.run_of[i], raw[i],
+                     shapes_.empty() ? J[i] : Eigen::MatrixXd(shapes_[i].inverse() * J[i])});
+  }
+  return ended;
 }
 
 }  // namespace gapfarm

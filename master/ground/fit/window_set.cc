@@ -184,8 +184,7 @@ void add_blocks(const RunLog& log, WindowSet* set) {
 }  // namespace
 
 double WindowSet::stretches() const {
-  const auto of_poses =
-      std::count_if(horizon.begin(), horizon.end(), [this](int h) { return h < lengths; });
+  const auto of_poses = std::ranges::count_if(horizon, [this](int h) { return h < lengths; });
   return static_cast<double>(of_poses) / lengths;
 }
 

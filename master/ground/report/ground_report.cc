@@ -6,10 +6,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "common/random/stream.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/report/ground_text.h"
-#include "master/ground/search.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -18,7 +16,6 @@ namespace {
 constexpr std::size_t kMostAliases = 3;
 constexpr double kAlmostSure = 0.99;  // no log makes surer than this
 
-// What was found, with what is needed to put it into words and figures.
 class GroundReport {
  public:
   GroundReport(const GroundRobot& robot, const GroundSearch& search,
@@ -92,9 +89,8 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   for (const KinematicRow& row : h.freed) {
     for (std::size_t j = 0; j < search_.rows.size(); ++j) {
       if (search_.rows[j].row.name != row.name) continue;
-      const auto k = static_cast<Eigen::Index>(j);
       effect.parameters.push_back(
-          estimate_of(row, search_.fit.values[k], intervals_(k, 0), intervals_(k, 1)));
+          estimate_of(row, search_.fit.values[j], intervals_(j, 0), intervals_(j, 1)));
     }
   }
   const double floor = sum(search_.best.nats);
@@ -242,8 +238,7 @@ void GroundReport::screening() {
     const bool fitted = offer.values.size() > 0;
     for (std::size_t k = 0; fitted && k < h.freed.size(); ++k) {
       s.estimate += fmt::format("{}{} {:+.4g} {}", k > 0 ? ", " : "", h.freed[k].key,
-                                offer.values[static_cast<Eigen::Index>(k)] - h.freed[k].nominal,
-                                h.freed[k].unit);
+                                offer.values[k] - h.freed[k].nominal, h.freed[k].unit);
     }
     s.note = h.thing;
     d_.screening.push_back(std::move(s));
@@ -262,7 +257,7 @@ void GroundReport::screening() {
 
 void GroundReport::trials() {
   const auto cov_of = [&](const WindowFit& fit, std::size_t i) {
-    const Eigen::Vector3d s = fit.scales[static_cast<std::size_t>(search_.windows.horizon[i])];
+    const Eigen::Vector3d s = fit.scales[search_.windows.horizon[i]];
     return Eigen::Matrix3d(s.cwiseProduct(s).asDiagonal());
   };
   const auto tuned = fitter_.raw_residuals(search_.chain.front());
@@ -334,12 +329,11 @@ std::vector<ReportedValue> GroundReport::reported_values() const {
   std::vector<ReportedValue> values;
   for (std::size_t j = 0; j < search_.rows.size(); ++j) {
     const FitRow& row = search_.rows[j];
-    const auto k = static_cast<Eigen::Index>(j);
     // Against a reference every value is the two logs' own.
     values.push_back({row.row.name,
                       value_in_file(robot_, row.row.name),
-                      search_.fit.values[k],
-                      {intervals_(k, 0), intervals_(k, 1)},
+                      search_.fit.values[j],
+                      {intervals_(j, 0), intervals_(j, 1)},
                       row.free || search_.reference.has_value()});
     for (const SensorValue& v : search_.sensor) {
       if (v.row.name != row.row.name) continue;
@@ -384,14 +378,14 @@ Kinematics chosen_values(const GroundSearch& search) {
     if (!search.rows[j].free) continue;
     at.names.push_back(search.rows[j].row.name);
     at.values.conservativeResize(at.values.size() + 1);
-    at.values[at.values.size() - 1] = search.fit.values[static_cast<Eigen::Index>(j)];
+    at.values[at.values.size() - 1] = search.fit.values[j];
   }
   for (std::size_t k = 0; search.reference && k < search.reference->names.size(); ++k) {
     const std::string& name = search.reference->names[k];
     if (std::find(at.names.begin(), at.names.end(), name) != at.names.end()) continue;
     at.names.push_back(name);
     at.values.conservativeResize(at.values.size() + 1);
-    at.values[at.values.size() - 1] = search.reference->values[static_cast<Eigen::Index>(k)];
+    at.values[at.values.size() - 1] = search.reference->values[k];
   }
   return at;
 }

@@ -125,8 +125,7 @@ Where finding_of(const ComponentGap& gap, int component, double all,
   static constexpr std::array<const char*, 3> kSpoken = {"along the way", "across the way",
                                                          "in the heading"};
   Where w;
-  const auto c = static_cast<std::size_t>(component);
-  w.component = kNames[c];
+  w.component = kNames[component];
   const auto longest = std::max_element(gap.by_horizon.begin(), gap.by_horizon.end());
   const auto h = static_cast<std::size_t>(longest - gap.by_horizon.begin());
   w.command = fmt::format("{:g} s", horizons_s.at(std::min(h, horizons_s.size() - 1)));
@@ -143,7 +142,7 @@ Where finding_of(const ComponentGap& gap, int component, double all,
   if (later > 0.75 || later < 0.25) w.covariate = "time";
   w.text = fmt::format(
       "{:.0f} % of what could still be closed lies {}, most over {}{}: {} of {:.3g} {}.",
-      100 * w.share, kSpoken[c], w.command,
+      100 * w.share, kSpoken[component], w.command,
       w.covariate.empty() ? "" : (later > 0.5 ? ", in the later half" : ", in the earlier half"),
       biased ? "a mean error" : "a scatter", w.size, component < 2 ? "mm" : "mrad");
   return w;
@@ -275,8 +274,8 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
     end = std::max(end, *trial.t_s);
   }
   for (int c = 0; c < 3; ++c) {
-    ComponentGap& gap = gaps[static_cast<std::size_t>(c)];
-    gap.by_horizon.assign(static_cast<std::size_t>(windows.horizons), 0.0);
+    ComponentGap& gap = gaps[c];
+    gap.by_horizon.assign(windows.horizons, 0.0);
     for (std::size_t i = 0; i < windows.trials.size(); ++i) {
       const auto h = static_cast<std::size_t>(windows.horizon[i]);
       const double gained = window_nats(search.best.residuals[i][c], search.best.scales[h][c]) -
@@ -294,7 +293,7 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
   for (const ComponentGap& gap : gaps) all += std::max(0.0, gap.nats);
   std::vector<Where> found;
   for (int c = 0; c < 3 && all > 0; ++c) {
-    const ComponentGap& gap = gaps[static_cast<std::size_t>(c)];
+    const ComponentGap& gap = gaps[c];
     if (gap.nats < kLeastShareOfGap * all) continue;
     found.push_back(finding_of(gap, c, all, horizons_s));
   }
@@ -307,7 +306,7 @@ std::string values_that_would_move(const GroundSearch& search) {
   std::vector<std::pair<double, std::string>> moved;
   for (std::size_t k = 0; k < search.rows.size(); ++k) {
     const FitRow& row = search.rows[k];
-    const double by = search.free_fit.values[static_cast<Eigen::Index>(k)] - row.row.nominal;
+    const double by = search.free_fit.values[k] - row.row.nominal;
     if (row.free || std::abs(by) < kMovedTolerances * row.row.tolerance) continue;
     moved.emplace_back(-std::abs(by) / row.row.tolerance, value_move(row, by));
   }

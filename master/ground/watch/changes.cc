@@ -79,9 +79,8 @@ Candidate best_of(const std::vector<Candidate>& steps, const std::vector<double>
   const auto beyond = [&](const Candidate& step) {
     return step.statistic - (thresholds.empty() ? 0 : thresholds[step.value]);
   };
-  return *std::max_element(steps.begin(), steps.end(), [&](const Candidate& a, const Candidate& b) {
-    return beyond(a) < beyond(b);
-  });
+  return *std::ranges::max_element(
+      steps, [&](const Candidate& a, const Candidate& b) { return beyond(a) < beyond(b); });
 }
 
 void add_step(const Candidate& step, Scaled* fleet) {
@@ -277,8 +276,7 @@ ValueStep describe_step(const WatchedRows& rows, const Scaled& fleet, const RunV
     squares += onsets[i] * (s.change * s.change + 1 / s.precision);
     step.statistic = std::max(step.statistic, s.statistic());
   }
-  step.onset =
-      static_cast<std::size_t>(std::max_element(onsets.begin(), onsets.end()) - onsets.begin());
+  step.onset = static_cast<std::size_t>(std::ranges::max_element(onsets) - onsets.begin());
   std::tie(step.onset_first, step.onset_last) = span_of(onsets);
   const double half = kNormal90 * std::sqrt(std::max(0.0, squares - step.change * step.change));
   step.lo = step.change - half;

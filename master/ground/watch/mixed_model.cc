@@ -1,7 +1,6 @@
 #include "master/ground/watch/mixed_model.h"
 
 #include <Eigen/Dense>
-#include <algorithm>
 
 #include "common/math/algebra.h"
 

@@ -3,9 +3,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/math/laws.h"
 #include "master/ground/watch/mixed_model.h"
 #include "master/report/figures/line_chart.h"
@@ -70,9 +70,8 @@ std::size_t run_count(const WatchedFleet& fleet) {
 std::string verdict(const WatchedFleet& fleet, const FleetChanges& changes) {
   const std::string first = first_to_look_at(fleet, changes);
   const bool changed = !changes.steps.empty() || !changes.odd_robots.empty();
-  const bool shown = std::any_of(fleet.robots.begin(), fleet.robots.end(), [](const auto& robot) {
-    return robot.runs.size() >= 2 * kLeastRuns;
-  });
+  const bool shown = std::ranges::any_of(
+      fleet.robots, [](const auto& robot) { return robot.runs.size() >= 2 * kLeastRuns; });
   return std::string(changed ? "Something changed."
                      : shown ? "Nothing changed that these runs show."
                              : "Too few runs: a change has three of them before it and three "
@@ -143,8 +142,6 @@ std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes) {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 Json value_json(const WatchedFleet& fleet, std::size_t robot, std::size_t value) {
   const WatchedValue& watched = fleet.rows.values[value];
   return {{"robot", fleet.robots[robot].name},
@@ -212,7 +209,7 @@ Json robots_json(const WatchedFleet& fleet, const FleetChanges& changes) {
 
 }  // namespace
 
-nlohmann::ordered_json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
+Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
   Json odd_robots = Json::array(), odd_runs = Json::array(), skipped = Json::array();
   for (const OddRobot& odd : changes.odd_robots) {
     odd_robots.push_back(value_json(fleet, odd.robot, odd.value));
@@ -256,8 +253,7 @@ std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
       "Each run's value with its 90 % interval, all other values as the robot's own. An interval "
       "holds what differs from run to run.");
   // What changed first.
-  std::vector<std::size_t> order;
-  for (const ValueStep& step : changes.steps) order.push_back(step.value);
+  std::vector<std::size_t> order = mapped(changes.steps, &ValueStep::value);
   for (const OddRobot& odd : changes.odd_robots) order.push_back(odd.value);
   for (std::size_t k = 0; k < fleet.rows.values.size(); ++k) order.push_back(k);
   std::vector<char> drawn(fleet.rows.values.size(), 0);
@@ -269,11 +265,10 @@ std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
   page.heading("What all share, and by how much robots and runs differ");
   std::vector<Line> rows;
   for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    rows.push_back({fleet.rows.rows[k].name, fmt::format("{:.5g}", changes.shared[i]),
-                    fmt::format("{:.2g}", changes.shared_errors[i]),
-                    fmt::format("{:.2g}", changes.robot_deviations[i]),
-                    fmt::format("{:.2g}", changes.run_deviations[i]), fleet.rows.rows[k].unit});
+    rows.push_back({fleet.rows.rows[k].name, fmt::format("{:.5g}", changes.shared[k]),
+                    fmt::format("{:.2g}", changes.shared_errors[k]),
+                    fmt::format("{:.2g}", changes.robot_deviations[k]),
+                    fmt::format("{:.2g}", changes.run_deviations[k]), fleet.rows.rows[k].unit});
   }
   page.table(
       {"value", "shared", "standard error", "from robot to robot", "from run to run", "unit"},

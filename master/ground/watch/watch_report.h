@@ -1,10 +1,10 @@
 // What `gapfarm watch` found, as text, JSON and a page.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "common/json/json.h"
 #include "master/ground/watch/changes.h"
 
 namespace gapfarm {
@@ -33,7 +33,7 @@ std::string skip_text(const WatchedSkip& skip);
 // "robot/run"; empty: nothing is to be looked at.
 std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& changes);
 std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes);
-nlohmann::ordered_json watch_json(const WatchedFleet& fleet, const FleetChanges& changes);
+Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes);
 std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes);
 
 }  // namespace gapfarm

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "common/base/constants.h"
+#include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "master/io/log_checks/log_checks.h"
@@ -54,11 +55,7 @@ std::string degrees(double angle_rad) {
   return std::string(text) + " degrees";
 }
 
-std::string share(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f", value);
-  return text;
-}
+std::string share(double value) { return formatted("%.2f", value); }
 
 bool near(double angle_rad, double axis_rad) {
   return std::abs(wrap_angle(angle_rad - axis_rad)) < kNearAxis_rad;

@@ -33,15 +33,8 @@ std::string finding_phrase(const SanityFinding& finding) {
 }
 
 const char* severity_name(Severity severity) {
-  switch (severity) {
-    case Severity::kNote:
-      return "note";
-    case Severity::kWarning:
-      return "doubt";
-    case Severity::kUnusable:
-      return "unusable";
-  }
-  return "note";
+  constexpr const char* kNames[] = {"note", "doubt", "unusable"};
+  return kNames[static_cast<std::size_t>(severity)];
 }
 
 }  // namespace gapfarm

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "common/base/ranges.h"
+
 namespace gapfarm {
 
 enum class Severity {
@@ -24,10 +26,7 @@ struct SanityFinding {
 };
 
 inline bool any_unusable(const std::vector<SanityFinding>& findings) {
-  for (const SanityFinding& f : findings) {
-    if (f.severity == Severity::kUnusable) return true;
-  }
-  return false;
+  return contains(findings, Severity::kUnusable, &SanityFinding::severity);
 }
 
 // "left and right are exchanged": what a finding means, for a headline.

@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <tuple>
 
+#include "common/base/text.h"
 #include "master/io/log_checks/sanity.h"
 
 namespace gapfarm {
@@ -25,11 +25,7 @@ std::string row_text(const Trial& trial) {
 
 }  // namespace
 
-std::string few_digits(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string few_digits(double value) { return formatted("%.3g", value); }
 
 const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, double expected_m) {
   const LengthUnit* best = nullptr;

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/parameters/push.h"
-#include "common/problem/problem.h"
 #include "master/io/log_checks/drive_checks.h"
-#include "master/io/log_checks/finding.h"
 #include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
@@ -142,14 +140,12 @@ std::vector<SanityFinding> check_sanity(const Problem& problem) {
   if (problem.scenario == "push") check_pushes(problem, &findings);
   for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
   check_clock(problem.log, &findings);
-  const bool still = std::any_of(findings.begin(), findings.end(),
-                                 [](const SanityFinding& f) { return f.name == "no_motion"; });
+  const bool still = contains(findings, "no_motion", &SanityFinding::name);
   if (!still) check_copies(problem.log, &findings);
   check_count(problem.log, &findings);
-  std::stable_sort(findings.begin(), findings.end(),
-                   [](const SanityFinding& a, const SanityFinding& b) {
-                     return a.severity == Severity::kUnusable && b.severity == Severity::kNote;
-                   });
+  std::ranges::stable_sort(findings, [](const SanityFinding& a, const SanityFinding& b) {
+    return a.severity == Severity::kUnusable && b.severity == Severity::kNote;
+  });
   return findings;
 }
 

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <numbers>
 #include <set>
-#include <string_view>
 #include <tuple>
 #include <utility>
 
 #include "common/base/constants.h"
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "common/config/toml_section.h"
@@ -228,10 +228,7 @@ constexpr double kUnitLength = 0.1;
 }  // namespace
 
 const MappedColumn* TableMap::find(std::string_view role) const {
-  for (const MappedColumn& column : columns) {
-    if (column.role == role) return &column;
-  }
-  return nullptr;
+  return find_by(columns, role, &MappedColumn::role);
 }
 
 std::span<const std::string> TableMap::noise() const {
@@ -252,11 +249,8 @@ double unit_factor(std::string_view unit) {
 }
 
 std::span<const std::string> known_units() {
-  static const std::vector<std::string> kNames = [] {
-    std::vector<std::string> names;
-    for (const Unit& unit : kUnits) names.emplace_back(unit.name);
-    return names;
-  }();
+  static const std::vector<std::string> kNames =
+      mapped(kUnits, [](const Unit& unit) { return std::string(unit.name); });
   return kNames;
 }
 
@@ -324,8 +318,7 @@ bool to_pose(const TableMap& map, std::vector<double>& values) {
 bool at_its_time(const TableMap& map, bool poses, std::vector<double>& before,
                  std::vector<double>& values) {
   const auto any = [&](bool MappedColumn::*kind) {
-    return std::any_of(map.columns.begin(), map.columns.end(),
-                       [&](const MappedColumn& c) { return c.*kind; });
+    return std::ranges::any_of(map.columns, [&](const MappedColumn& c) { return c.*kind; });
   };
   const bool rates = any(&MappedColumn::rate), increments = any(&MappedColumn::increment);
   const double last = before.empty() ? 0 : before[0];

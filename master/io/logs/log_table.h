@@ -1,7 +1,6 @@
 // A recording as it is written: named columns of numbers, whatever file they came from.
 #pragma once
 
-#include <cmath>
 #include <optional>
 #include <string>
 #include <string_view>

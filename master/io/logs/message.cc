@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <set>
-#include <vector>
 
 #include "common/trials/text/csv.h"
 

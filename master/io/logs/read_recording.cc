@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/files.h"
@@ -13,9 +14,7 @@ namespace {
 
 // Nanoseconds of a clock, micrometres of a pose: more digits are noise.
 std::string digits(double value, int decimals) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  std::string out = text;
+  std::string out = formatted("%.*f", decimals, value);
   while (out.find('.') != out.npos && (out.back() == '0' || out.back() == '.')) {
     const bool point = out.back() == '.';
     out.pop_back();
@@ -25,11 +24,7 @@ std::string digits(double value, int decimals) {
 }
 
 // Covariances have no digits that count from the point.
-std::string short_number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
+std::string short_number(double value) { return formatted("%.6g", value); }
 
 std::string format_commands(const std::vector<std::string>& channels, const RunLog& log,
                             std::vector<CommandRow> LoggedRun::*rows) {
@@ -89,9 +84,8 @@ RunFiles format_runs(const RunLog& log) {
   files.commands = format_commands(log.channels, log, &LoggedRun::commands);
   files.wheels = format_commands(log.wheel_channels, log, &LoggedRun::wheel_speeds);
   files.gyro = format_commands({"yaw_rate"}, log, &LoggedRun::yaw_rates);
-  const bool noisy = std::any_of(log.runs.begin(), log.runs.end(), [](const LoggedRun& run) {
-    return !run.poses.empty() && run.poses.back().noise;
-  });
+  const bool noisy = std::ranges::any_of(
+      log.runs, [](const LoggedRun& run) { return !run.poses.empty() && run.poses.back().noise; });
   files.poses = log.relative ? "run,t,dx,dy,dtheta" : "run,t,x,y,theta";
   for (const std::string& name : kCovarianceColumns) files.poses += noisy ? "," + name : "";
   files.poses += "\n";

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "common/base/try.h"
@@ -362,11 +363,10 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
   const std::string commas = with_commas(text);
   if (!commas.empty()) text = commas;
   const char separator = find_separator(text);
-  Result<std::vector<CsvRow>> rows = parse_separated(text, file, separator);
-  if (!rows) return rows.error();
-  if (rows->empty()) return wrong_format(file, TextFormat::kEmpty, "a log of drives");
-  const CsvRow& first = rows->front();
-  if (first.fields[0].text == "Format Version") return parse_motive(*rows, file);
+  ASSIGN_OR_RETURN(auto rows, parse_separated(text, file, separator));
+  if (rows.empty()) return wrong_format(file, TextFormat::kEmpty, "a log of drives");
+  const CsvRow& first = rows.front();
+  if (first.fields[0].text == "Format Version") return parse_motive(rows, file);
   const auto named = [&](std::string_view name) {
     return std::any_of(first.fields.begin(), first.fields.end(),
                        [&](const CsvField& f) { return f.text == name; });
@@ -377,8 +377,8 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
   const bool headed =
       std::none_of(first.fields.begin(), first.fields.end(),
                    [&](const CsvField& f) { return parse_decimal(f.text, separator).has_value(); });
-  return headed ? parse_headed(*std::move(rows), file, separator)
-                : parse_echo(*rows, file, separator);
+  return headed ? parse_headed(std::move(rows), file, separator)
+                : parse_echo(rows, file, separator);
 }
 
 std::string LogTable::unit_of(std::string_view name) const {

@@ -10,7 +10,6 @@
 #include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/text/csv.h"
-#include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {

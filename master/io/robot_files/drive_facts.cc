@@ -4,119 +4,72 @@
 #include <cctype>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {
 
-struct NumberKey {
-  const char* written;
+struct NumberKeys {
   const char* name;
   double scale;
+  std::vector<std::string_view> written;
 };
 
 // ros2_controllers first (its older names behind), then Gazebo's and gz-sim's plugins.
-constexpr NumberKey kNumbers[] = {
-    {"wheel_separation", "wheel_separation", 1},
-    {"wheelSeparation", "wheel_separation", 1},
-    {"encoderWheelSeparation", "wheel_separation", 1},
-    {"tracks_separation", "wheel_separation", 1},
-    {"wheel_radius", "wheel_radius", 1},
-    {"wheelRadius", "wheel_radius", 1},
-    {"wheel_diameter", "wheel_radius", 0.5},
-    {"wheelDiameter", "wheel_radius", 0.5},
-    {"actuatedWheelDiameter", "wheel_radius", 0.5},
-    {"kinematics.wheels_radius", "wheel_radius", 1},
-    {"traction_wheels_radius", "wheel_radius", 1},
-    {"traction_wheel_radius", "wheel_radius", 1},
-    {"rear_wheels_radius", "wheel_radius", 1},
-    {"rear_wheel_radius", "wheel_radius", 1},
-    {"front_wheels_radius", "front_wheel_radius", 1},
-    {"front_wheel_radius", "front_wheel_radius", 1},
-    {"wheel_separation_multiplier", "wheel_separation_multiplier", 1},
-    {"left_wheel_radius_multiplier", "left_wheel_radius_multiplier", 1},
-    {"right_wheel_radius_multiplier", "right_wheel_radius_multiplier", 1},
-    {"wheelbase", "wheelbase", 1},
-    {"wheel_base", "wheelbase", 1},
-    {"wheelBase", "wheelbase", 1},
-    {"traction_track_width", "traction_track_width", 1},
-    {"rear_wheel_track", "traction_track_width", 1},
-    {"steering_track_width", "steering_track_width", 1},
-    {"front_wheel_track", "steering_track_width", 1},
-    {"kingpin_width", "steering_track_width", 1},
-    {"wheel_track", "traction_track_width", 1},
-    {"kinematics.sum_of_robot_center_projection_on_X_Y_axis", "lx_plus_ly", 1},
-    {"robot_radius", "robot_radius", 1},
-    {"wheel_offset", "wheel_offset", 1},
-    {"cmd_vel_timeout", "cmd_vel_timeout", 1},
-    {"reference_timeout", "cmd_vel_timeout", 1},
-    {"linear.x.max_velocity", "max_velocity", 1},
-    {"max_linear_velocity", "max_velocity", 1},
-    {"max_speed", "max_velocity", 1},
-    {"linear.x.max_acceleration", "max_acceleration", 1},
-    {"max_linear_acceleration", "max_acceleration", 1},
-    {"linear.x.max_jerk", "max_jerk", 1},
-    {"angular.z.max_velocity", "max_angular_velocity", 1},
-    {"max_angular_velocity", "max_angular_velocity", 1},
-    {"angular.z.max_acceleration", "max_angular_acceleration", 1},
-    {"max_angular_acceleration", "max_angular_acceleration", 1},
-    {"wheelAcceleration", "max_wheel_acceleration", 1},
-    {"max_wheel_acceleration", "max_wheel_acceleration", 1},
-    {"steering_limit", "max_steering", 1},
-    {"max_steer", "max_steering", 1},
-    {"wheels_per_side", "wheels_per_side", 1},
-};
+const std::vector<NumberKeys> kNumbers = {
+    {"wheel_separation",
+     1,
+     {"wheel_separation", "wheelSeparation", "encoderWheelSeparation", "tracks_separation"}},
+    {"wheel_radius",
+     1,
+     {"wheel_radius", "wheelRadius", "kinematics.wheels_radius", "traction_wheels_radius",
+      "traction_wheel_radius", "rear_wheels_radius", "rear_wheel_radius"}},
+    {"wheel_radius", 0.5, {"wheel_diameter", "wheelDiameter", "actuatedWheelDiameter"}},
+    {"front_wheel_radius", 1, {"front_wheels_radius", "front_wheel_radius"}},
+    {"wheel_separation_multiplier", 1, {"wheel_separation_multiplier"}},
+    {"left_wheel_radius_multiplier", 1, {"left_wheel_radius_multiplier"}},
+    {"right_wheel_radius_multiplier", 1, {"right_wheel_radius_multiplier"}},
+    {"wheelbase", 1, {"wheelbase", "wheel_base", "wheelBase"}},
+    {"traction_track_width", 1, {"traction_track_width", "rear_wheel_track", "wheel_track"}},
+    {"steering_track_width", 1, {"steering_track_width", "front_wheel_track", "kingpin_width"}},
+    {"lx_plus_ly", 1, {"kinematics.sum_of_robot_center_projection_on_X_Y_axis"}},
+    {"robot_radius", 1, {"robot_radius"}},
+    {"wheel_offset", 1, {"wheel_offset"}},
+    {"cmd_vel_timeout", 1, {"cmd_vel_timeout", "reference_timeout"}},
+    {"max_velocity", 1, {"linear.x.max_velocity", "max_linear_velocity", "max_speed"}},
+    {"max_acceleration", 1, {"linear.x.max_acceleration", "max_linear_acceleration"}},
+    {"max_jerk", 1, {"linear.x.max_jerk"}},
+    {"max_angular_velocity", 1, {"angular.z.max_velocity", "max_angular_velocity"}},
+    {"max_angular_acceleration", 1, {"angular.z.max_acceleration", "max_angular_acceleration"}},
+    {"max_wheel_acceleration", 1, {"wheelAcceleration", "max_wheel_acceleration"}},
+    {"max_steering", 1, {"steering_limit", "max_steer"}},
+    {"wheels_per_side", 1, {"wheels_per_side"}}};
 
-struct JointKey {
-  const char* written;
+struct JointKeys {
   const char* role;
+  std::vector<std::string_view> written;
 };
 
-constexpr JointKey kJoints[] = {
-    {"left_wheel_names", "left"},
-    {"left_wheel", "left"},
-    {"left_wheels", "left"},
-    {"leftJoint", "left"},
-    {"left_joint", "left"},
-    {"left_wheel_joint", "left"},
-    {"leftFrontJoint", "left"},
-    {"leftRearJoint", "left"},
-    {"left_track", "left"},
-    {"right_wheel_names", "right"},
-    {"right_wheel", "right"},
-    {"right_wheels", "right"},
-    {"rightJoint", "right"},
-    {"right_joint", "right"},
-    {"right_wheel_joint", "right"},
-    {"rightFrontJoint", "right"},
-    {"rightRearJoint", "right"},
-    {"right_track", "right"},
-    {"traction_joints_names", "traction"},
-    {"traction_joint_name", "traction"},
-    {"rear_wheels_names", "traction"},
-    {"rear_wheel_name", "traction"},
-    {"rear_wheel", "traction"},
-    {"actuatedWheelJoint", "traction"},
-    {"steering_joints_names", "steering"},
-    {"steering_joint_name", "steering"},
-    {"front_wheels_names", "steering"},
-    {"front_wheel_name", "steering"},
-    {"front_steer", "steering"},
-    {"left_steering_joint", "steering"},
-    {"right_steering_joint", "steering"},
-    {"steeringJoint", "steering"},
-    {"wheel_names", "omni"},
-    {"front_left_wheel_command_joint_name", "front_left"},
-    {"front_right_wheel_command_joint_name", "front_right"},
-    {"rear_left_wheel_command_joint_name", "rear_left"},
-    {"rear_right_wheel_command_joint_name", "rear_right"},
-    {"front_left_joint", "front_left"},
-    {"front_right_joint", "front_right"},
-    {"rear_left_joint", "rear_left"},
-    {"rear_right_joint", "rear_right"},
-    {"back_left_joint", "rear_left"},
-    {"back_right_joint", "rear_right"},
-};
+const std::vector<JointKeys> kJoints = {
+    {"left",
+     {"left_wheel_names", "left_wheel", "left_wheels", "leftJoint", "left_joint",
+      "left_wheel_joint", "leftFrontJoint", "leftRearJoint", "left_track"}},
+    {"right",
+     {"right_wheel_names", "right_wheel", "right_wheels", "rightJoint", "right_joint",
+      "right_wheel_joint", "rightFrontJoint", "rightRearJoint", "right_track"}},
+    {"traction",
+     {"traction_joints_names", "traction_joint_name", "rear_wheels_names", "rear_wheel_name",
+      "rear_wheel", "actuatedWheelJoint"}},
+    {"steering",
+     {"steering_joints_names", "steering_joint_name", "front_wheels_names", "front_wheel_name",
+      "front_steer", "left_steering_joint", "right_steering_joint", "steeringJoint"}},
+    {"omni", {"wheel_names"}},
+    {"front_left", {"front_left_wheel_command_joint_name", "front_left_joint"}},
+    {"front_right", {"front_right_wheel_command_joint_name", "front_right_joint"}},
+    {"rear_left", {"rear_left_wheel_command_joint_name", "rear_left_joint", "back_left_joint"}},
+    {"rear_right",
+     {"rear_right_wheel_command_joint_name", "rear_right_joint", "back_right_joint"}}};
 
 struct TypeWord {
   const char* word;
@@ -145,7 +98,7 @@ std::vector<std::string> DriveFacts::joints_of(const std::vector<std::string>& r
     const auto found = joints.find(role);
     if (found == joints.end()) continue;
     for (const std::string& joint : found->second.names) {
-      if (std::find(all.begin(), all.end(), joint) == all.end()) all.push_back(joint);
+      if (!contains(all, joint)) all.push_back(joint);
     }
   }
   return all;
@@ -155,15 +108,15 @@ std::string DriveFacts::place(int at_line) const { return file + ":" + std::to_s
 
 bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::string>& values,
                int line) {
-  for (const NumberKey& row : kNumbers) {
-    if (key != row.written || values.size() != 1) continue;
+  for (const NumberKeys& row : kNumbers) {
+    if (!contains(row.written, key) || values.size() != 1) continue;
     const auto value = parse_double(values[0]);
     if (!value || !std::isfinite(*value)) return false;
     facts.numbers.emplace(row.name, StatedNumber{*value * row.scale, std::string(key), line});
     return true;
   }
-  for (const JointKey& row : kJoints) {
-    if (key != row.written) continue;
+  for (const JointKeys& row : kJoints) {
+    if (!contains(row.written, key)) continue;
     StatedJoints& stated = facts.joints[row.role];
     if (stated.names.empty()) {
       stated.key = key;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/base/text.h"
 #include "common/svg/svg.h"
 #include "master/io/robot_files/robot_text.h"
 
@@ -73,18 +74,12 @@ class Picture {
             kHead_px + 24 + (high_.x() - p_R.x()) * scale_};
   }
 
-  static std::string text(double value, const char* format) {
-    char out[48];
-    std::snprintf(out, sizeof out, format, value);
-    return out;
-  }
-
   void heading(Svg& svg) const {
     const std::string name = r_.name.empty() ? "robot" : r_.name;
     svg.text({16, 24}, name, {16, kInk, SvgAnchor::kStart, true});
     std::string line = "drive " + drive_names()[static_cast<std::size_t>(r_.drive)] +
                        ", seen from above, ahead is up";
-    if (reading_.robot.mass_kg) line += text(*reading_.robot.mass_kg, "; %.4g kg");
+    if (reading_.robot.mass_kg) line += formatted("; %.4g kg", *reading_.robot.mass_kg);
     svg.text({16, 44}, line, {12, kFaint});
   }
 
@@ -147,10 +142,10 @@ class Picture {
     }
     svg.text(place, wheel.name, {12, kInk, anchor, true});
     std::string line = wheel.radius_m && wheel.kind != WheelKind::kCaster
-                           ? text(*wheel.radius_m * 1e3, "r %.4g mm")
+                           ? formatted("r %.4g mm", *wheel.radius_m * 1e3)
                            : "";
     const auto i = static_cast<std::size_t>(&wheel - r_.wheels.data());
-    if (i < loads_.size()) line += (line.empty() ? "" : ", ") + text(loads_[i], "%.3g N");
+    if (i < loads_.size()) line += (line.empty() ? "" : ", ") + formatted("%.3g N", loads_[i]);
     if (!line.empty()) svg.text({place.x, place.y + 14}, line, {11, kFaint, anchor});
   }
 
@@ -200,7 +195,8 @@ class Picture {
     svg.line({16, foot - 5}, {16, foot + 5}, {"none", kInk, 2});
     svg.line({16 + length * scale_, foot - 5}, {16 + length * scale_, foot + 5}, {"none", kInk, 2});
     svg.text({24 + length * scale_, foot + 4},
-             length >= 1 ? text(length, "%.4g m") : text(length * 1e3, "%.4g mm"), {11, kInk});
+             length >= 1 ? formatted("%.4g m", length) : formatted("%.4g mm", length * 1e3),
+             {11, kInk});
   }
 
   const RobotReading& reading_;

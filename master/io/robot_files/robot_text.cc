@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 
+#include "common/base/text.h"
 #include "common/json/json.h"
 #include "common/parameters/ground.h"
 
@@ -71,19 +72,11 @@ std::string search_of_driving(const GroundRobot& robot) {
          "[evolution]\nstop = { evaluations = 600 }\n";
 }
 
-std::string joined(const std::vector<std::string>& texts, const char* around) {
-  std::string text;
-  for (const std::string& word : texts) {
-    text += (text.empty() ? "" : ", ") + (around + word) + around;
-  }
-  return text;
-}
+std::string quoted(const std::string& word) { return '"' + word + '"'; }
 
 std::string number(double value, const char* format = "%.4g") {
-  char text[32];
   // Sums of decimals end in 1e-17; nobody measures nanometres.
-  std::snprintf(text, sizeof text, format, std::abs(value) < 1e-9 ? 0.0 : value);
-  return text;
+  return formatted(format, std::abs(value) < 1e-9 ? 0.0 : value);
 }
 
 std::string number(const std::optional<double>& value, const char* format = "%.4g") {
@@ -189,7 +182,7 @@ std::string controller_text(const ControllerKinematics& c) {
 std::string config_of_robot(const GroundRobot& robot, const RobotConfigTexts& texts) {
   std::string text =
       "# A ground robot, fitted to logs of it driving (docs/ground.md), made of " +
-      joined(texts.made_of, "") +
+      joined(texts.made_of) +
       ".\n"
       "# Lines with QUESTION are guesses; answer them, in the robot's file where they are about "
       "it,\n# then `gapfarm check` this file.\nscenario = \"ground\"\nseed = 1\n\n";
@@ -198,7 +191,7 @@ std::string config_of_robot(const GroundRobot& robot, const RobotConfigTexts& te
   if (texts.runs.empty()) {
     text += "# QUESTION: where are its runs?  `gapfarm import runs LOG --out drive` makes them.\n";
   }
-  text += "folders = [" + (texts.runs.empty() ? "\"drive\"" : joined(texts.runs, "\"")) +
+  text += "folders = [" + (texts.runs.empty() ? "\"drive\"" : joined(texts.runs, ", ", quoted)) +
           "]   # commands.csv and poses.csv in each\n\n";
   return text + search_of_driving(robot);
 }

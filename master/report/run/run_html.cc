@@ -17,18 +17,12 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr int kVersion = 1;
 
 constexpr auto kScore = [](auto& v, auto& row) {
-  v.field("name", row.name);
-  v.if_any("score", row.score);
-  v.if_any("position_mm", row.position_mm);
-  v.if_any("heading_mrad", row.heading_mrad);
+  FIELDS(name);
+  IF_ANY(score, position_mm, heading_mrad);
 };
-
-using Json = nlohmann::ordered_json;
 
 constexpr int kRunPlotDigits = 7;
 
@@ -82,9 +76,8 @@ std::string summary(const RunReport& report) {
 
 std::string score_table(const std::vector<ScoreRow>& rows, const std::string& column,
                         const char* file) {
-  const bool errors = std::any_of(rows.begin(), rows.end(), [](const ScoreRow& row) {
-    return row.position_mm || row.heading_mrad;
-  });
+  const bool errors = std::ranges::any_of(
+      rows, [](const ScoreRow& row) { return row.position_mm || row.heading_mrad; });
   std::vector<HtmlColumn> columns = {{""}, {html_escaped(column), "number", "score"}};
   if (errors)
     columns.insert(columns.end(), {{"position, mm", "number"}, {"heading, mrad", "number"}});

@@ -6,14 +6,13 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostPoints = 2000;  // of a line: more than a screen can show
 
@@ -23,16 +22,13 @@ double significant(double value) {
 }
 
 Json significant_all(const std::vector<double>& values) {
-  Json list = Json::array();
-  for (const double v : values) list.push_back(significant(v));
+  Json list = mapped(values, significant);
   return list;
 }
 
 Json significant_or_null(const std::optional<double>& value) {
   return value ? Json(significant(*value)) : Json(nullptr);
 }
-
-using Json = nlohmann::ordered_json;
 
 std::string list_of(const std::vector<std::string>& lines, const char* css_class) {
   std::string html = fmt::format(R"(<ul class="{}">)", css_class);
@@ -74,8 +70,7 @@ constexpr const char* kLittleIsKnown =
 // Zeros of a store that has no place for other numbers are none.
 bool is_little_known(const RunFarm& farm) {
   return farm.timeline.counts.empty() &&
-         std::all_of(farm.tally.begin(), farm.tally.end(),
-                     [](const auto& entry) { return entry.second == "0"; });
+         std::ranges::all_of(farm.tally, [](const auto& entry) { return entry.second == "0"; });
 }
 
 std::string tally_html(const RunFarm& farm) {
@@ -225,10 +220,7 @@ Json generations_json(const RunReport& report) {
 }
 
 Json operators_json(const RunReport& report) {
-  Json shares = Json::array();
-  for (const std::vector<double>& row : report.probabilities) {
-    shares.push_back(significant_all(row));
-  }
+  Json shares = mapped(report.probabilities, significant_all);
   return {{"names", report.operators},
           {"generations", report.probability_generations},
           {"probabilities", std::move(shares)}};
@@ -243,8 +235,7 @@ Json elite_json(const RunReport& report) {
                     {"upper", axis.upper}});
   }
   for (const RunElite::Line& line : report.elite.lines) {
-    Json shares = Json::array();
-    for (const double share : line.shares) shares.push_back(significant(share));
+    Json shares = mapped(line.shares, significant);
     lines.push_back({{"id", line.birth_id},
                      {"fitness", significant_or_null(line.fitness)},
                      {"shares", std::move(shares)},
@@ -254,15 +245,14 @@ Json elite_json(const RunReport& report) {
 }
 
 Json densities_json(const RunReport& report) {
-  Json list = Json::array();
-  for (const GeneDensity& d : report.densities) {
-    list.push_back({{"key", d.key},
-                    {"unit", d.unit},
-                    {"edges", significant_all(d.edges)},
-                    {"generations", d.generations},
-                    {"counts", d.counts},
-                    {"best", significant_all(d.best)}});
-  }
+  Json list = mapped(report.densities, [&](const GeneDensity& d) -> Json {
+    return {{"key", d.key},
+            {"unit", d.unit},
+            {"edges", significant_all(d.edges)},
+            {"generations", d.generations},
+            {"counts", d.counts},
+            {"best", significant_all(d.best)}};
+  });
   return list;
 }
 

@@ -1,9 +1,9 @@
 // What a run's page says of how it went on: operators, populations, genomes, the farm.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "common/json/json.h"
 #include "master/report/run/run_report.h"
 
 namespace gapfarm {
@@ -20,12 +20,12 @@ std::string genomes_section(const RunReport& report);
 std::string farm_section(const RunFarm& farm);
 
 // At most 2,000.
-nlohmann::ordered_json generations_json(const RunReport& report);
-nlohmann::ordered_json operators_json(const RunReport& report);
-nlohmann::ordered_json densities_json(const RunReport& report);
-nlohmann::ordered_json elite_json(const RunReport& report);
-nlohmann::ordered_json front_json(const RunReport& report);
-nlohmann::ordered_json sample_json(const RunReport& report);
-nlohmann::ordered_json timeline_json(const RunFarm& farm);
+Json generations_json(const RunReport& report);
+Json operators_json(const RunReport& report);
+Json densities_json(const RunReport& report);
+Json elite_json(const RunReport& report);
+Json front_json(const RunReport& report);
+Json sample_json(const RunReport& report);
+Json timeline_json(const RunFarm& farm);
 
 }  // namespace gapfarm

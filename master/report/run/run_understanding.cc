@@ -11,8 +11,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 // What a plot can show of it.
 Json short_list(const std::vector<double>& values, int digits) {
   Json list = Json::array();

@@ -6,8 +6,8 @@
 
 #include "common/random/stream.h"
 #include "common/robot/robot_file.h"
+#include "master/ground/fit/fit_file.h"
 #include "master/ground/watch/changes.h"
-#include "master/ground/watch/run_cache.h"
 
 namespace gapfarm::watch_test {
 namespace {
@@ -136,18 +136,18 @@ TEST(RunCache, TakesUpFitsAndReasonsAndLeavesABrokenLine) {
   const OffsetFit fit = make_fleet(rows_of_create(), 15)[0][0];
   {
     RunCache cache(file);
-    EXPECT_EQ(cache.find("a"), nullptr);
+    EXPECT_FALSE(cache.find("a"));
     cache.keep("a", fit);
     cache.keep("b", Error{"too short"});
   }
   std::ofstream(file, std::ios::app) << "{\"key\": \"c\", \"val";
   RunCache again(file);
-  ASSERT_NE(again.find("a"), nullptr);
+  ASSERT_TRUE(again.find("a"));
   EXPECT_EQ((*again.find("a"))->values, fit.values);
   EXPECT_EQ((*again.find("a"))->covariance, fit.covariance);
-  ASSERT_NE(again.find("b"), nullptr);
+  ASSERT_TRUE(again.find("b"));
   EXPECT_EQ(again.find("b")->error().message, "too short");
-  EXPECT_EQ(again.find("c"), nullptr);
+  EXPECT_FALSE(again.find("c"));
   std::filesystem::remove(file);
 }
 

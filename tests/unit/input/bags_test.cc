@@ -11,6 +11,7 @@
 #include "master/io/logs/decompress.h"
 #include "master/io/logs/message.h"
 #include "master/io/logs/to_runs.h"
+#include "tests/fuzz/memory_source.h"
 
 namespace gapfarm::bags_test {
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/base/ranges.h"
 #include "master/io/robot_files/urdf/xml_reader.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
@@ -24,9 +25,10 @@ TEST(Urdf, ReadsLinksJointsAndPoses) {
   EXPECT_EQ(model->links.size(), 4u);
   const auto poses = link_poses(*model);
   EXPECT_TRUE(poses.at("lw").translation().isApprox(Eigen::Vector3d(0, 0.2, 0.1)));
-  ASSERT_NE(model->find_joint("left_wheel"), nullptr);
-  EXPECT_TRUE(model->find_joint("left_wheel")->axis_given);
-  EXPECT_FALSE(model->find_joint("ball")->axis_given);
+  const UrdfJoint* wheel = find_by(model->joints, "left_wheel", &UrdfJoint::name);
+  ASSERT_NE(wheel, nullptr);
+  EXPECT_TRUE(wheel->axis_given);
+  EXPECT_FALSE(find_by(model->joints, "ball", &UrdfJoint::name)->axis_given);
   EXPECT_TRUE(model->notes.empty());
 }
 

@@ -40,7 +40,8 @@ void expect_named_outcome(RobotModel robot, unsigned corner) {
   const Command& command = kHard[corner % 6];
   const Motion motion = run_once(corner_settings(robot, corner),
                                  drive_at(0.5 * command.left, 0.5 * command.right, 0.2));
-  SCOPED_TRACE("corner " + std::to_string(corner) + " " + outcome_name(motion.outcome));
+  SCOPED_TRACE("corner " + std::to_string(corner) + " outcome " +
+               std::to_string(static_cast<int>(motion.outcome)));
   EXPECT_TRUE(std::isfinite(motion.duration_s));
   if (motion.outcome == MotionOutcome::kDiverged) return;
   EXPECT_TRUE(std::isfinite(motion.X_SE.theta));

@@ -69,7 +69,7 @@ TEST_P(Reset, AnyHistoryGivesTheBitsOfANewSimulator) {
       const Task task = draw_task(draw);
       const Motion again = used.run(task.drive, task.floor);
       EXPECT_TRUE(same(again, run_once(settings, task.drive, task.floor)))
-          << "seed " << seed << " run " << i << " " << outcome_name(again.outcome);
+          << "seed " << seed << " run " << i << " outcome " << static_cast<int>(again.outcome);
       if (again.outcome == MotionOutcome::kDiverged) ++diverged;
     }
   }

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "common/score/motion_model.h"
-#include "worker/scenarios/outcome.h"
 
 namespace gapfarm {
 namespace {

@@ -129,9 +129,7 @@ std::vector<Eigen::Vector2d> support_corners(const PushSettings& settings) {
 }
 
 Eigen::Vector2d FingerPath::at(double t_s) const {
-  const auto after =
-      std::upper_bound(samples_.begin(), samples_.end(), t_s,
-                       [](double t, const FingerSample& sample) { return t < sample.t_s; });
+  const auto after = std::ranges::upper_bound(samples_, t_s, {}, &FingerSample::t_s);
   if (after == samples_.begin()) return samples_.front().p_SF;
   if (after == samples_.end()) return samples_.back().p_SF;
   const FingerSample& a = *(after - 1);

@@ -66,8 +66,7 @@ class PushSimulator {
   // REQUIRES: settings within the bounds of the parameter table.
   explicit PushSimulator(const PushSettings& settings);
   ~PushSimulator();
-  PushSimulator(const PushSimulator&) = delete;
-  PushSimulator& operator=(const PushSimulator&) = delete;
+  PushSimulator& operator=(PushSimulator&&) = delete;
 
   const PushSettings& settings() const;
 

@@ -1,7 +1,6 @@
 // A Bullet world for one flat piece on one plane and the finger that pushes it.
 #pragma once
 
-#include <memory>
 #include <optional>
 
 #include "worker/sim/bullet.h"

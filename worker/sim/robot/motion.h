@@ -5,8 +5,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <string>
-#include <vector>
 
 #include "common/base/constants.h"
 #include "common/pose/pose.h"
@@ -87,7 +85,6 @@ struct Floor {
 };
 
 enum class MotionOutcome { kOk, kDiverged, kFellOver, kNeverRested };
-const char* outcome_name(MotionOutcome outcome);
 
 struct MotionSample {
   double t_s = 0;

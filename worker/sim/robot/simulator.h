@@ -18,8 +18,7 @@ class Simulator {
   // `steps` (may be null) outlives the simulator and shows from outside that it advances.
   explicit Simulator(const SimSettings& settings, StepCounter* steps = nullptr);
   ~Simulator();
-  Simulator(const Simulator&) = delete;
-  Simulator& operator=(const Simulator&) = delete;
+  Simulator& operator=(Simulator&&) = delete;
 
   const SimSettings& settings() const;
 

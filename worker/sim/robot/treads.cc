@@ -1,6 +1,5 @@
 // One rigid body on four small spheres, two under each tread.  More than four supports would make
 // the sharing of the load arbitrary.
-#include <array>
 #include <memory>
 #include <optional>
 

@@ -143,9 +143,7 @@ void draft_cases(const DesignSettings& settings, const std::vector<std::size_t>&
 void add_overrides(const ParameterTable& table, std::size_t effect,
                    const std::vector<double>& values, v1::Point& point) {
   for (std::size_t i = 0; i < values.size(); ++i) {
-    v1::Override* override = point.add_overrides();
-    override->set_parameter(static_cast<std::uint32_t>(table.effect_row(effect) + i));
-    override->set_value(values[i]);
+    *point.add_overrides() = override_of(table.effect_row(effect) + i, values[i]);
   }
 }
 
@@ -278,11 +276,8 @@ Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::ve
   std::vector<TrialLog> logs(cases.size());
   for (std::size_t i = 0; i < results.size(); ++i) {
     const v1::TaskResult& result = results[i];
-    if (result.outcome() != v1::OK) {
-      return Error{cases[owner[i]].id + ": the simulation ended with " +
-                   v1::Outcome_Name(result.outcome()) + " (" + result.message() +
-                   "); try another --seed, or values that make a robot that drives"};
-    }
+    RETURN_IF_ERROR(ended_well(result, cases[owner[i]].id + ": the simulation",
+                               "; try another --seed, or values that make a robot that drives"));
     for (const v1::Trial& trial : result.simulate().trials()) {
       logs[owner[i]].trials.push_back(from_proto(trial));
     }
@@ -344,10 +339,7 @@ std::vector<v1::Override> overrides_of(const ParameterTable& table, const Truth&
   std::vector<v1::Override> overrides;
   const auto add = [&](const std::string& key, double value) {
     const auto row = table.find(key);
-    if (!row) return;
-    overrides.emplace_back();
-    overrides.back().set_parameter(static_cast<std::uint32_t>(*row));
-    overrides.back().set_value(value);
+    if (row) overrides.push_back(override_of(*row, value));
   };
   for (const auto& [key, value] : truth.robot) add(key, value);
   for (const TrueEffect& effect : truth.effects) {

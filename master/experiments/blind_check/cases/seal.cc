@@ -18,8 +18,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr std::size_t kSaltBytes = 16;
 constexpr std::size_t kSealBytes = 32;
 

@@ -64,8 +64,7 @@ class PrivateMemory {
  public:
   PrivateMemory();
   ~PrivateMemory();
-  PrivateMemory(const PrivateMemory&) = delete;
-  PrivateMemory& operator=(const PrivateMemory&) = delete;
+  PrivateMemory& operator=(PrivateMemory&&) = delete;
 
  private:
   int before_;

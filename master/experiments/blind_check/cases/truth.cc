@@ -8,8 +8,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 const std::vector<std::string>& kind_names() {
   static const std::vector<std::string> names = {"null", "single", "pair", "outside"};
   return names;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "common/base/constants.h"
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/math/algebra.h"
 #include "common/trials/text/csv.h"
@@ -141,24 +142,11 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
 }  // namespace
 
 const UrdfLink* UrdfModel::find_link(std::string_view wanted) const {
-  for (const UrdfLink& link : links) {
-    if (link.name == wanted) return &link;
-  }
-  return nullptr;
-}
-
-const UrdfJoint* UrdfModel::find_joint(std::string_view wanted) const {
-  for (const UrdfJoint& joint : joints) {
-    if (joint.name == wanted) return &joint;
-  }
-  return nullptr;
+  return find_by(links, wanted, &UrdfLink::name);
 }
 
 const UrdfJoint* UrdfModel::joint_above(std::string_view link) const {
-  for (const UrdfJoint& joint : joints) {
-    if (joint.child == link) return &joint;
-  }
-  return nullptr;
+  return find_by(joints, link, &UrdfJoint::child);
 }
 
 Result<UrdfModel> parse_urdf(std::string_view text, const std::string& file) {

@@ -102,7 +102,6 @@ struct UrdfModel {
   std::vector<UrdfNote> notes;
 
   const UrdfLink* find_link(std::string_view name) const;
-  const UrdfJoint* find_joint(std::string_view name) const;
   // The joint whose child `link` is; null for the root.
   const UrdfJoint* joint_above(std::string_view link) const;
 };
