@@ -268,7 +268,10 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
     return a.held_out_gain.mean > b.held_out_gain.mean;
   });
+  // What has a name needs no other one while what is left is tolerated.
+  const bool further = !search->steps.empty();
   const auto chosen = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+    if (further && !(c.held_out_gain.hi > kToleratedGap)) return false;
     return may_be_named(c.held_out_gain) && c.offer.gain >= kShareOfBest * most &&
            may_be_named(gain_beyond_traces(fitter.windows(), work, *search, c));
   });

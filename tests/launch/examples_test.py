@@ -83,11 +83,12 @@ def make_stand_ins():
         shutil.copy(ROOT / "configs/demo.toml", f"{name}.toml")
         text = Path(f"{name}.toml").read_text().replace("demo/trials.csv", "trials.csv")
         Path(f"{name}.toml").write_text(text)
-    for day in ("monday", "friday", "held_out"):
+    for day in ("monday", "tuesday", "friday", "held_out"):
         make_runs(Path(day))
     make("evolve", "configs/demo.toml", "--out", "run/demo", "--generations", "20", "--population", "4")
     shutil.copytree("run/demo", "run/srv1")
     shutil.copy("run/demo/model.toml", "model.toml")
+    make("report", "run/demo", "--out", "run.html", "--history", "candidates.csv", workers=())
     make("diagnose", "configs/demo.toml", "--out", "diagnosis")
     make("init", "husky.urdf", "control.yaml", "monday", "--out", "husky.toml", workers=())
     shutil.copy("husky.toml", "warthog.toml")

@@ -98,7 +98,7 @@ SubcommandRun setup_evolve(CLI::App& app) {
       "Examples:\n"
       "  gapfarm evolve configs/demo.toml --out run/demo\n"
       "  gapfarm evolve configs/srv1.toml --trials monday.csv tuesday.csv --out run/srv1\n"
-      "  gapfarm evolve configs/demo.toml --from history.csv --out run/again\n"
+      "  gapfarm evolve configs/demo.toml --from candidates.csv --out run/again\n"
       "  gapfarm evolve configs/demo.toml --out run/big --workers-on slurm --max 200 --wall-time "
       "4:00:00");
   return [command](CliContext& context) { return run_evolve(*command, context); };
