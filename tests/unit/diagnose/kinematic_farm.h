@@ -3,43 +3,20 @@
 
 #include <cmath>
 #include <functional>
-#include <map>
-#include <string>
 #include <vector>
 
-#include "common/problem/problem.h"
 #include "common/score/motion_model.h"
-#include "master/farm/farm.h"
+#include "tests/unit/diagnose/answering_farm.h"
 
 namespace gapfarm {
 
-class KinematicFarm : public Farm {
+class KinematicFarm : public AnsweringFarm {
  public:
   using Fails = std::function<bool(const ParameterValues&)>;
   explicit KinematicFarm(Fails fails = {}) : fails_(std::move(fails)) {}
 
-  std::string add_problem(const v1::Problem& problem) override {
-    const std::string hash = problem_hash(problem);
-    problems_[hash] = from_proto(problem).value();
-    return hash;
-  }
-
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& = {}) override {
-    std::vector<v1::TaskResult> results;
-    for (const v1::Task& task : tasks) results.push_back(answer(problems_.at(hash), task));
-    asked += tasks.size();
-    return results;
-  }
-
-  std::vector<WorkerStatus> workers() const override { return {}; }
-  std::uint64_t retries() const override { return 0; }
-
-  std::size_t asked = 0;
-
  private:
-  v1::TaskResult answer(const Problem& problem, const v1::Task& whole) const {
+  v1::TaskResult answer(const Problem& problem, const v1::Task& whole) const override {
     v1::TaskResult result;
     ParameterValues values = problem.values;
     const v1::PredictTask& task = whole.predict();
@@ -108,7 +85,6 @@ class KinematicFarm : public Farm {
   }
 
   Fails fails_;
-  std::map<std::string, Problem> problems_;
 };
 
 // A log that this farm's robot drives at the problem's own values.

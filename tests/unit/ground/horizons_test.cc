@@ -11,14 +11,20 @@
 namespace gapfarm {
 namespace {
 
-TEST(Horizons, ReportEveryWindowBesideTheMedians) {
-  Problem problem = tests::ground_problem();
+// Run a of 12 s and run b, which the problem takes for its own.
+RunLog two_runs(Problem& problem, double b_s) {
   const RunLog log{problem.ground->robot().channels,
                    {},
                    {tests::driven_run(problem, problem.values, 12, "a"),
-                    tests::driven_run(problem, problem.values, 9, "b")},
+                    tests::driven_run(problem, problem.values, b_s, "b")},
                    {}};
   tests::take_runs(problem, log.runs);
+  return log;
+}
+
+TEST(Horizons, ReportEveryWindowBesideTheMedians) {
+  Problem problem = tests::ground_problem();
+  const RunLog log = two_runs(problem, 9);
   tests::WorkerFarm farm;
   const auto horizons = measure_horizons(farm, problem, problem.values, log, {{2, 0}, 0.5});
   ASSERT_TRUE(horizons.ok()) << horizons.error().message;
@@ -69,12 +75,7 @@ class FallsOver : public tests::WorkerFarm {
 
 TEST(Horizons, CountARunThatFallsOverAsInfinitelyFarOff) {
   Problem problem = tests::ground_problem();
-  const RunLog log{problem.ground->robot().channels,
-                   {},
-                   {tests::driven_run(problem, problem.values, 12, "a"),
-                    tests::driven_run(problem, problem.values, 4, "b")},
-                   {}};
-  tests::take_runs(problem, log.runs);
+  const RunLog log = two_runs(problem, 4);
   FallsOver farm(0);
   const auto horizons = measure_horizons(farm, problem, problem.values, log, {{2}, 0.5});
   ASSERT_TRUE(horizons.ok()) << horizons.error().message;

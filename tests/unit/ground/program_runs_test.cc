@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <map>
 
 #include "common/config/config.h"
 #include "common/random/stream.h"
+#include "tests/unit/diagnose/answering_farm.h"
 
 namespace gapfarm::program_runs_test {
 
@@ -27,27 +27,12 @@ Pose follow(const std::vector<CommandRow>& commands, double start_s, double t, d
 }
 
 // Every worker's program, without any.
-class ProgramOfRuns : public Farm {
+class ProgramOfRuns : public AnsweringFarm {
  public:
-  std::string add_problem(const v1::Problem& problem) override {
-    const std::string hash = problem_hash(problem);
-    problems_[hash] = from_proto(problem).value();
-    return hash;
-  }
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& = {}) override {
-    std::vector<v1::TaskResult> results;
-    for (const v1::Task& task : tasks) results.push_back(answer(problems_.at(hash), task));
-    return results;
-  }
-  std::vector<WorkerStatus> workers() const override { return {}; }
-  std::uint64_t retries() const override { return 0; }
-
   std::string fails;  // of every task
 
  private:
-  v1::TaskResult answer(const Problem& problem, const v1::Task& task) const {
+  v1::TaskResult answer(const Problem& problem, const v1::Task& task) const override {
     v1::TaskResult result;
     result.set_outcome(fails.empty() ? v1::OK : v1::WORKER_FAILED);
     result.set_message(fails);
@@ -72,8 +57,6 @@ class ProgramOfRuns : public Farm {
     }
     return result;
   }
-
-  std::map<std::string, Problem> problems_;
 };
 
 Problem problem_of(const std::string& genes = "") {
