@@ -272,11 +272,11 @@ std::string format_horizons(const Horizons& horizons) {
                         ratio_cell(row.heading));
   }
   text += significantly_apart(horizons);
-  if (horizons.unfinished_runs > 0) {
+  if (const std::size_t n = horizons.unfinished_runs; n > 0) {
     text += fmt::format(
-        "{} runs could not be simulated to their end (the robot fell over or left "
-        "bounds); their windows count as infinitely far off\n",
-        horizons.unfinished_runs);
+        "{} run{} could not be simulated to the end (the robot fell over or left bounds); windows "
+        "count as infinitely far off there\n",
+        n, n == 1 ? "" : "s");
   }
   if (!kinematics) return text;
   text += "kinematics:";

@@ -194,9 +194,9 @@ Result<int> export_runs(ExportCommand& command, CliContext& context) {
   }
   files.emplace_back(kMcapName, mcap.finish());
   RETURN_IF_ERROR(command.outputs.write_in(command.out, files));
-  std::string text =
-      fmt::format("{} runs in {}: {}, and a table each; ends are {:.3g} m off (median)",
-                  paths.runs.size(), command.out, kMcapName, paths.after_m);
+  std::string text = fmt::format(
+      "{} run{} in {}: {}, and a table each; ends are {:.3g} m off (median)", paths.runs.size(),
+      paths.runs.size() == 1 ? "" : "s", command.out, kMcapName, paths.after_m);
   if (shown.size() > 2) text += fmt::format(", as the file says {:.3g} m", paths.before_m);
   console.result(text + "\n", {{"out", command.out},
                                {"runs", paths.runs.size()},
