@@ -5,10 +5,12 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/ground/watch/mixed_model.h"
+#include "master/infer/certificate.h"
 
 namespace gapfarm {
 namespace {
@@ -20,7 +22,6 @@ using Eigen::VectorXd;
 constexpr int kRounds = 40;      // of EM, from the priors
 constexpr int kWarmRounds = 4;   // from values nearby
 constexpr int kNullDraws = 400;  // of each kind
-constexpr double kTail = 0.1;    // of the draws, whose excess is exponential
 constexpr double kCovered = 0.9;
 constexpr std::size_t kMostSteps = 12;
 constexpr double kOddWeight = 0.25;  // of a run that is off by itself
@@ -186,18 +187,6 @@ class NullRuns {
   VectorXd between_;
 };
 
-// What a share `alarms` of these maxima exceed, by their tail.
-double threshold_of(const std::vector<double>& maxima, double alarms) {
-  const double from = quantile(maxima, 1 - kTail);
-  double excess = 0, beyond = 0;
-  for (const double m : maxima) {
-    if (m <= from) continue;
-    excess += m - from;
-    beyond += 1;
-  }
-  return from + (beyond > 0 ? excess / beyond : 0) * std::log(kTail / alarms);
-}
-
 WatchThresholds draw_thresholds(const Scaled& fleet, const RunVariances& variances,
                                 const NullRuns& null, std::uint64_t seed, bool in_order) {
   std::vector<std::vector<double>> steps(fleet.directions.size());
@@ -217,8 +206,11 @@ WatchThresholds draw_thresholds(const Scaled& fleet, const RunVariances& varianc
       steps[step.value].push_back(step.statistic);
     }
   }
-  const double each = compared ? kFalseAlarms / 2 : kFalseAlarms;
-  WatchThresholds thresholds{{}, compared ? threshold_of(robots, each) : 0};
+  double runs = 0;
+  for (const RobotRuns& robot : fleet.robots) runs += static_cast<double>(robot.values.size());
+  const double alarms = std::min(kFalseAlarmsPerRun * runs, kMostFalseAlarms);
+  const double each = compared ? alarms / 2 : alarms;
+  WatchThresholds thresholds{alarms, {}, compared ? threshold_of(robots, each) : 0};
   for (const std::vector<double>& of_value : steps) {
     thresholds.steps.push_back(threshold_of(of_value, each / static_cast<double>(steps.size())));
   }
@@ -323,6 +315,20 @@ std::vector<std::vector<RunReading>> readings_of(const WatchedRows& rows, const 
   return readings;
 }
 
+std::vector<std::vector<double>> detectable_of(const Scaled& fleet, RobotRuns robot,
+                                               const RunVariances& variances,
+                                               const WatchThresholds& thresholds) {
+  robot.steps.clear();
+  std::vector<std::vector<double>> detectable;
+  for (const auto& scores : score_steps(fit_robot(robot, variances), robot, fleet.directions)) {
+    const double squares =
+        infer::noncentrality_for(infer::kDetectablePower, thresholds.steps[detectable.size()], 1);
+    detectable.push_back(mapped(
+        scores, [&](const StepScore& score) { return std::sqrt(squares / score.precision); }));
+  }
+  return detectable;
+}
+
 }  // namespace
 
 FleetChanges find_changes(const WatchedRows& rows,
@@ -369,6 +375,8 @@ FleetChanges find_changes(const WatchedRows& rows,
       if (weights[i] < kOddWeight)
         result.odd_runs.push_back({result.readings.size(), i, weights[i]});
     }
+    result.detectable.push_back(
+        detectable_of(fleet, fleet.robots[result.readings.size()], variances, most));
     result.readings.push_back(readings_of(rows, fleet, fit, result.owned.back()));
   }
   std::vector<std::size_t> names(fits.size());

@@ -63,6 +63,7 @@ struct RunReading {
 };
 
 struct WatchThresholds {
+  double false_alarms = 0;    // chance of a call on robots without changes
   std::vector<double> steps;  // of each value
   double robot = 0;
 };
@@ -76,14 +77,18 @@ struct FleetChanges {
   // Of each robot one a row: what it owns, before its first step, and its standard errors.
   std::vector<Eigen::VectorXd> owned, owned_errors;
   std::vector<std::vector<std::vector<RunReading>>> readings;  // [robot][value][run]
-  std::vector<ValueStep> steps;                                // by robot and onset
+  // Likewise: the change that is named with chance kDetectablePower where it begins with this run;
+  // infinite where none is looked for.
+  std::vector<std::vector<std::vector<double>>> detectable;
+  std::vector<ValueStep> steps;  // by robot and onset
   std::vector<OddRun> odd_runs;
   std::vector<OddRobot> odd_robots;
 };
 
-// A call names something of robots without changes with less than this probability, whatever the
-// number of robots, runs and values.
-inline constexpr double kFalseAlarms = 1.0 / 200;
+// A call on robots without changes names something with this probability a run, and at most with
+// the customary one in twenty, whatever the number of robots and values.
+inline constexpr double kFalseAlarmsPerRun = 1.0 / 200;
+inline constexpr double kMostFalseAlarms = 0.05;
 
 // Runs of each robot in their order.  Steps have three runs before and behind them at least; a
 // single run that is off is an odd run.  Robots are held against one another from three on.

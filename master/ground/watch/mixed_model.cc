@@ -1,8 +1,11 @@
 #include "master/ground/watch/mixed_model.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 
 #include "common/math/algebra.h"
+#include "common/math/statistics.h"
 
 namespace gapfarm {
 namespace {
@@ -12,6 +15,7 @@ constexpr double kPriorRuns = 4;  // of the variances from run to run
 constexpr double kPriorDispersion = 1e4;
 constexpr double kPriorRobots = 4;
 constexpr int kSharedRounds = 12;
+constexpr double kTail = 0.1;  // of maxima, whose excess is exponential
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -140,6 +144,18 @@ Shared estimate_shared(const std::vector<RobotFit>& fits, const VectorXd& prior,
     at.between = between / robots;
   }
   return at;
+}
+
+double threshold_of(const std::vector<double>& maxima, double alarms) {
+  const double from = quantile(maxima, 1 - std::max(kTail, alarms));
+  if (alarms >= kTail) return from;
+  double excess = 0, beyond = 0;
+  for (const double m : maxima) {
+    if (m <= from) continue;
+    excess += m - from;
+    beyond += 1;
+  }
+  return from + (beyond > 0 ? excess / beyond : 0) * std::log(kTail / alarms);
 }
 
 }  // namespace gapfarm

@@ -62,4 +62,8 @@ Shared estimate_shared(const std::vector<RobotFit>& fits, const Eigen::VectorXd&
 
 inline constexpr std::size_t kLeastRuns = 3;
 
+// What a share `alarms` of such maxima exceed, by the exponential tail of the highest tenth where
+// it is less than that.
+double threshold_of(const std::vector<double>& maxima, double alarms);
+
 }  // namespace gapfarm

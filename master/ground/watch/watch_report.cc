@@ -188,11 +188,14 @@ Json shared_json(const WatchedFleet& fleet, const FleetChanges& changes) {
 Json robots_json(const WatchedFleet& fleet, const FleetChanges& changes) {
   Json robots = Json::array();
   for (std::size_t u = 0; u < fleet.robots.size(); ++u) {
-    Json values = Json::object(), runs = Json::array();
+    Json values = Json::object(), runs = Json::array(), detectable = Json::object();
     for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       values[fleet.rows.rows[k].name] = {{"value", changes.owned[u][i]},
                                          {"error", changes.owned_errors[u][i]}};
+    }
+    for (std::size_t k = 0; k < fleet.rows.values.size(); ++k) {
+      detectable[fleet.rows.values[k].value] = changes.detectable[u][k];
     }
     for (std::size_t i = 0; i < fleet.robots[u].runs.size(); ++i) {
       Json run = {{"run", fleet.robots[u].runs[i]}};
@@ -202,7 +205,10 @@ Json robots_json(const WatchedFleet& fleet, const FleetChanges& changes) {
       }
       runs.push_back(std::move(run));
     }
-    robots.push_back({{"robot", fleet.robots[u].name}, {"values", values}, {"runs", runs}});
+    robots.push_back({{"robot", fleet.robots[u].name},
+                      {"values", values},
+                      {"detectable", detectable},
+                      {"runs", runs}});
   }
   return robots;
 }
@@ -235,7 +241,7 @@ Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
           {"odd_robots", odd_robots},
           {"odd_runs", odd_runs},
           {"skipped", skipped},
-          {"false_alarms", kFalseAlarms},
+          {"false_alarms", changes.thresholds.false_alarms},
           {"thresholds", thresholds},
           {"dispersion", changes.dispersion},
           {"shared", shared_json(fleet, changes)},
