@@ -56,6 +56,13 @@ class Proposals {
         catalogue_(std::move(catalogue)),
         base_(nuisances) {}
 
+  // From now on beside these.  REQUIRES: the study outlives it.
+  void move_beside(const Study& study, const Regression& nuisances) {
+    study_ = &study;
+    base_ = nuisances;
+    if (patch_search_) look_for_patches();
+  }
+
   // From now on candidates() looks for friction patches, too, and for a second one beside a first.
   void look_for_patches();
 

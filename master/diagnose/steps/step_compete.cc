@@ -275,10 +275,28 @@ class Selection {
   std::optional<Found> found_;
 };
 
+// What retuning the base would do depends on what was chosen: on a slope friction shows, on a flat
+// floor hardly.
+Status measure_nuisances_there(const DiagnosisRequest& of, const JointFit& fit,
+                               Screening* screening) {
+  auto evidence = evidence_at(of, *screening->found.evidence, fit);
+  // What cannot be simulated there stays as it is at the base.
+  if (!evidence) {
+    return evidence.error().code == ErrorCode::kSimulation ? Status() : evidence.error();
+  }
+  auto there = std::make_shared<const Evidence>(std::move(*evidence));
+  screening->catalogue->move_beside(there->study, there->base);
+  screening->found.evidence = std::move(there);
+  return {};
+}
+
 // The chosen effects beside the base as it was tuned: data as if their predictions were linear.
 Status relinearise(const DiagnosisRequest& of, Screening* screening) {
   Explanation& named = screening->found;
   const std::vector<EffectCandidate> effects = candidates_of(named.chosen);
+  ASSIGN_OR_RETURN(auto first, estimate(of, *screening->catalogue, named, effects, 2));
+  named.estimates = std::move(first);
+  RETURN_IF_ERROR(measure_nuisances_there(of, *named.estimates, screening));
   ASSIGN_OR_RETURN(auto fit, estimate(of, *screening->catalogue, named, effects, 2));
   ASSIGN_OR_RETURN(const auto there, relinearised_at(of, named.study(), fit, effects));
   named.estimates = std::move(fit);

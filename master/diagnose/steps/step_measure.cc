@@ -89,12 +89,26 @@ Result<Explanation> put_late_readings_right(const DiagnosisRequest& of, Explanat
 
 }  // namespace
 
+std::vector<BaseParameter> whole_base(const DiagnosisRequest& of, const Study& study) {
+  std::vector<BaseParameter> base = study.base_parameters;
+  for (const RetunedParameter& p : study.drive.retuned) {
+    const bool searched = contains(of.options.genes, p.row, &Gene::row);
+    if (!searched || p.unit != 0 || contains(base, p.row, &BaseParameter::row)) continue;
+    base.push_back({p.row, p.prior_sd});
+  }
+  return base;
+}
+
 Result<Study> tune(const DiagnosisRequest& of) {
   Result<Study> study = of.subject.make_study(of.problem, of.options.genes);
   if (!study) return study;
-  const Status tuned = of.subject.tune(of.predictor, of.options.keep_base, &*study);
-  if (!tuned) return tuned.error();
-  return study;
+  Study whole = *study;
+  RETURN_IF_ERROR(of.subject.tune(of.predictor, of.options.keep_base, &*study));
+  if (study->on_bounds.empty()) return study;
+  // What draws a part of the base to its bounds may be that the rest is kept where it is.
+  whole.drive.tuned = whole.base_parameters = whole_base(of, whole);
+  const Status tuned = of.subject.tune(of.predictor, of.options.keep_base, &whole);
+  return tuned && whole.on_bounds.empty() ? std::move(whole) : std::move(*study);
 }
 
 Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study) {
@@ -104,6 +118,20 @@ Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study) {
   std::vector<CovariateBlock> blocks = of.subject.blocks(study);
   Regression base(*nuisances, study.whitened_residuals());
   return Evidence{std::move(study), std::move(*nuisances), std::move(blocks), std::move(base)};
+}
+
+Result<Evidence> evidence_at(const DiagnosisRequest& of, const Evidence& before,
+                             const JointFit& fit) {
+  Study there = before.study;
+  there.base = fit.at;
+  for (std::size_t i = 0; i < there.size(); ++i) there.trials[i].X_WP = fit.ends[i];
+  ASSIGN_OR_RETURN(Eigen::MatrixXd nuisances, of.subject.nuisances(of.predictor, there));
+  if (there.session_spread > 0) nuisances = beside_sessions(there, nuisances);
+  there.drop_ignored(nuisances);
+  Eigen::VectorXd residuals = before.study.whitened_residuals();
+  before.study.drop_ignored(residuals);
+  Regression base(nuisances, residuals);
+  return Evidence{before.study, std::move(nuisances), before.blocks, std::move(base)};
 }
 
 Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances) {

@@ -35,8 +35,14 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
 // By paired scores: not by chance, but for one case in twenty.
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
 
+// What tuning moves, and what else of the base the config has searched, within its prior.
+std::vector<BaseParameter> whole_base(const DiagnosisRequest& of, const Study& study);
+
 // The study's nuisances and covariates by its present noise.
 Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study);
+// The same beside nuisances as they are where that fit ended.
+Result<Evidence> evidence_at(const DiagnosisRequest& of, const Evidence& before,
+                             const JointFit& fit);
 // Nuisances, and before them what the gains of the study's sessions do.
 Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances);
 // The same without what these trials say.

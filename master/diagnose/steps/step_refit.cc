@@ -25,6 +25,13 @@ NestedFit nested_fit(const DiagnosisRequest& of, std::string name, JointFit fit,
   return nested;
 }
 
+// Beside effects all of the base moves: on flat floor friction and gauge pass for length and ratio,
+// and stay where they were.
+Study with_whole_base(const DiagnosisRequest& of, Study study) {
+  study.base_parameters = whole_base(of, study);
+  return study;
+}
+
 // The base alone, as it was logged and with late readings put right, then with one effect more at a
 // time.
 Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Explanation& named,
@@ -41,7 +48,8 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
   }
   std::set<std::string> names;
   std::vector<EffectCandidate> effects;
-  const Study beside = named.chosen.empty() ? study : study_beside(named, *named.estimates);
+  const Study beside =
+      named.chosen.empty() ? study : with_whole_base(of, study_beside(named, *named.estimates));
   for (std::size_t count = 0; count <= named.chosen.size(); ++count) {
     if (count > 0) {
       effects.push_back(named.chosen[count - 1].candidate);
@@ -62,7 +70,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
     for (std::size_t k = 0; k < effects.size(); ++k) {
       name += (k == 0 ? ", " : " and ") + effects[k].signature.effect;
     }
-    Study scored_in = alone ? study : study_beside(named, fit);
+    Study scored_in = alone ? study : with_whole_base(of, study_beside(named, fit));
     nested.push_back(nested_fit(of, name, std::move(fit), fitted_in, std::move(scored_in), folds));
   }
   return nested;

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""How often effects of stated sizes are named, beside how often the certificate says they would be.
+
+    gapfarm blind-check configs/srv1.toml --out CHECK --effects battery_sag camera_aspect ... \\
+        --sizes 1.005 1.01 1.02 1.04 --per-effect 6 --nulls 12 --pairs 0 --left-out 0
+    scripts/power_curves.py CHECK
+
+What is predicted comes from the check's nulls alone: the median of the sizes from which on they would
+have named each effect (`detectable_from`, 95 %). An effect of another size is named where twice its
+gain, a noncentral chi-squared, passes what 95 % of effects of that size pass. Effects of one strength.
+"""
+import json
+import math
+import pathlib
+import statistics
+import sys
+
+POWER = 0.95
+LEAST_GAIN = 9.0  # nats that a name asks for (docs/diagnosis.md), one parameter
+STUDENT = 0.849  # of twice a gain, what Student's weights leave on Gaussian noise (infer/certificate.cc)
+
+
+def normal_above(z):
+    """Chance of a standard normal beyond z."""
+    return math.erfc(z / math.sqrt(2)) / 2
+
+
+def chance(size):
+    """Of being named, of an effect `size` times as large as one that is with POWER: one parameter,
+    whose estimate over its deviation is normal about its size and has to pass a threshold."""
+    threshold = math.sqrt(2 * (LEAST_GAIN + 1) * STUDENT)
+    z = -next(k / 1000 for k in range(-5000, 0) if normal_above(k / 1000) < POWER)
+    at = (threshold + z) * size
+    return normal_above(threshold - at) + normal_above(threshold + at)
+
+
+def wilson(hits, total, z=1.96):
+    """95 % interval of a share."""
+    middle = (hits + z * z / 2) / (total + z * z)
+    half = z * math.sqrt(hits * (total - hits) / total + z * z / 4) / (total + z * z)
+    return middle - half, middle + half
+
+
+def diagnosis(folder, case):
+    """What was said of a case."""
+    return json.loads((folder / "diagnoses" / case / "diagnosis.json").read_text(encoding="utf-8"))
+
+
+def detectable(folder, cases):
+    """By effect and strength, from the nulls."""
+    sizes = {}
+    for case in cases:
+        if case["truth"]["kind"] != "null":
+            continue
+        for row in diagnosis(folder, case["case"])["screening"]:
+            for key, size in row.get("detectable_from", {}).items():
+                sizes.setdefault((row["effect"], key), []).append(size)
+    return {at: statistics.median(of) for at, of in sizes.items()}
+
+
+def main():
+    """Prints the table."""
+    if len(sys.argv) != 2:
+        raise SystemExit(__doc__)
+    folder = pathlib.Path(sys.argv[1])
+    cases = json.loads((folder / "blind_check.json").read_text(encoding="utf-8"))["cases"]
+    known, rows = detectable(folder, cases), {}
+    for case in cases:
+        truth = case["truth"]
+        if truth["kind"] != "single":
+            continue
+        (effect, values), = truth["effects"].items()
+        strengths = [(key, value) for key, value in values.items() if (effect, key) in known]
+        if len(strengths) != 1:
+            continue
+        key, value = strengths[0]
+        neutral = 1 if effect == "camera_aspect" else 0
+        expected = chance(abs(value - neutral) / known[effect, key])
+        said = case["said"] or {"effects": []}
+        named = any(effect in [one["name"], *one["aliases"]] for one in said["effects"])
+        for at in ((effect, truth["level"]), (effect, "all"), ("all", "all")):
+            rows.setdefault(at, []).append((expected, named))
+    print("| effect | size | cases | named | [95 %] | predicted |\n|---|---|---|---|---|---|")
+    for (effect, level), of in sorted(rows.items()):
+        hits = sum(named for _, named in of)
+        low, high = wilson(hits, len(of))
+        print(f"| {effect} | {level} | {len(of)} | {100 * hits / len(of):.0f} % "
+              f"| [{100 * low:.0f}, {100 * high:.0f}] "
+              f"| {100 * statistics.mean(expected for expected, _ in of):.0f} % |")
+
+
+if __name__ == "__main__":
+    main()
