@@ -26,7 +26,8 @@ struct Exchange {
 
 Exchange exchange_of(OptimiserKind kind, std::size_t islands) {
   if (kind == OptimiserKind::kCmaEs) return {2, islands > 8 ? 2u : 1u, 1};
-  return {1, 1, 2};
+  // Among very many someone is always extremely slow.
+  return {1, islands > 100 ? 2u : 1u, 2};
 }
 
 // Individuals of an island where [evolution] asynchronous chooses; of CMA-ES, which learns less
