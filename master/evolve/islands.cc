@@ -16,13 +16,23 @@
 namespace gapfarm {
 namespace {
 
-// Generations between two exchanges.
-constexpr std::uint64_t kExchange = 4;
-// Exchanges after which what was best goes out.  An island that is behind by less holds up nobody.
-constexpr std::uint64_t kAge = 1;
+// What an island learns from others before each of its generations.
+struct Exchange {
+  std::size_t others;  // so many of them, by turns near and far
+  std::uint64_t age;   // as they were so many generations before: an island that is behind by less
+                       // holds up nobody
+  std::size_t best;    // of their individuals, one in so many
+};
+
+Exchange exchange_of(OptimiserKind kind, std::size_t islands) {
+  if (kind == OptimiserKind::kCmaEs) return {2, islands > 8 ? 2u : 1u, 1};
+  // Among very many someone is always extremely slow.
+  return {1, islands > 100 ? 2u : 1u, 2};
+}
+
 // Individuals of an island where [evolution] asynchronous chooses; of CMA-ES, which learns less
 // from small ones, as many times its default.
-constexpr unsigned kIsland = 20, kIslandOfCmaEs_defaults = 4;
+constexpr unsigned kIsland = 20, kIslandOfCmaEs_defaults = 5;
 
 bool can_be_split(OptimiserKind kind) {
   return kind == OptimiserKind::kGenetic || kind == OptimiserKind::kDifferentialEvolution ||
@@ -54,7 +64,9 @@ struct Island {
 class IslandsOptimiser final : public Optimiser, public Islands {
  public:
   IslandsOptimiser(const OptimiserSetup& setup, unsigned count)
-      : whole_(population_of(setup.settings, setup.genes.size())), islands_(count) {}
+      : whole_(population_of(setup.settings, setup.genes.size())),
+        exchange_(exchange_of(setup.settings.optimiser.kind, count)),
+        islands_(count) {}
 
   Status begin_all(const OptimiserSetup& setup) {
     for (std::size_t i = 0; i < islands_.size(); ++i) {
@@ -88,24 +100,21 @@ class IslandsOptimiser final : public Optimiser, public Islands {
   std::string state() const override;
 
  private:
-  using Bests = std::vector<Individual>;  // one an island
-  struct Source {
-    std::size_t island;
-    std::uint64_t exchange;
-  };
+  using Shown = std::vector<std::vector<Individual>>;  // best first, one of each island
 
   OptimiserSetup setup_of(const OptimiserSetup& whole, std::size_t island) const;
-  std::optional<Source> source_of(std::size_t island) const;
+  std::optional<Shown> others_of(std::size_t island) const;
   Look look_at(std::size_t island) const;
+  void show(std::size_t island, const Look& look);
 
   std::uint64_t whole_;
+  Exchange exchange_;
   std::vector<Island> islands_;
   std::uint64_t generation_ = 0;
   std::uint64_t last_improvement_ = 0;
   Member best_;
-  // At the generations that are multiples of kExchange, by how many times.
-  std::map<std::uint64_t, Bests> exchanges_;
-  std::vector<Lot> asked_;  // by ask(), not told yet
+  std::map<std::uint64_t, Shown> shown_;  // by generation
+  std::vector<Lot> asked_;                // by ask(), not told yet
 };
 
 OptimiserSetup IslandsOptimiser::setup_of(const OptimiserSetup& whole, std::size_t island) const {
@@ -117,8 +126,8 @@ OptimiserSetup IslandsOptimiser::setup_of(const OptimiserSetup& whole, std::size
   settings.population = static_cast<unsigned>(whole_ / count + (island < whole_ % count ? 1 : 0));
   settings.optimiser.population = settings.population;
   setup.remembered = std::max<std::size_t>(setup.remembered / count, 4 * settings.population);
-  // Draws of its own.
-  setup.run_seed += 0xbf58476d1ce4e5b9u * island;
+  setup.first_birth = island;  // and draws of its own with it
+  setup.births_apart = count;
   setup.given.clear();
   for (std::size_t i = 0; i < whole.given.size(); ++i) {
     if ((i + 1) % count == island) setup.given.push_back(whole.given[i]);
@@ -132,15 +141,20 @@ OptimiserSetup IslandsOptimiser::setup_of(const OptimiserSetup& whole, std::size
   return setup;
 }
 
-// Whose best the island takes over before its next generation, as it was at which exchange.
-std::optional<IslandsOptimiser::Source> IslandsOptimiser::source_of(std::size_t island) const {
+// Null: some have not come so far yet.
+std::optional<IslandsOptimiser::Shown> IslandsOptimiser::others_of(std::size_t island) const {
   const std::uint64_t completed = islands_[island].optimiser->generation();
-  const std::uint64_t exchange = completed / kExchange;
-  if (completed % kExchange != 0 || exchange <= kAge) return std::nullopt;
   const std::size_t count = islands_.size();
   const auto steps = static_cast<std::uint64_t>(std::bit_width(count - 1));
-  const std::size_t step = std::size_t{1} << (exchange % steps);
-  return Source{(island + count - step) % count, exchange - kAge};
+  Shown others;
+  if (completed <= exchange_.age) return others;
+  for (std::uint64_t k = 0; k < std::min<std::uint64_t>(exchange_.others, steps); ++k) {
+    const std::size_t step = std::size_t{1} << ((completed * exchange_.others + k) % steps);
+    const std::size_t other = (island + count - step) % count;
+    if (islands_[other].optimiser->generation() + exchange_.age < completed) return std::nullopt;
+    others.push_back(shown_.at(completed - exchange_.age)[other]);
+  }
+  return others;
 }
 
 std::vector<Islands::Lot> IslandsOptimiser::begin(std::uint64_t last) {
@@ -151,23 +165,14 @@ std::vector<Islands::Lot> IslandsOptimiser::begin(std::uint64_t last) {
     for (std::size_t i = 0; i < islands_.size(); ++i) {
       Island& island = islands_[i];
       if (island.under_way || island.optimiser->generation() >= last) continue;
-      if (const auto source = source_of(i)) {
-        if (islands_[source->island].optimiser->generation() < source->exchange * kExchange) {
-          continue;
-        }
-        const Individual& best = exchanges_.at(source->exchange)[source->island];
-        if (better(best.standing, standing_of(island.optimiser->best()))) {
-          island.optimiser->inject(best.genome);
-        }
-      }
+      const std::optional<Shown> others = others_of(i);
+      if (!others) continue;
+      island.optimiser->meet(*others);
       Lot lot{i, island.optimiser->ask()};
       if (lot.candidates.empty()) {  // all are duplicates
         tell_island(i, {});
         again = true;
         continue;
-      }
-      for (Candidate& candidate : lot.candidates) {
-        candidate.birth_id = candidate.birth_id * islands_.size() + i;
       }
       island.under_way = true;
       lots.push_back(std::move(lot));
@@ -178,18 +183,27 @@ std::vector<Islands::Lot> IslandsOptimiser::begin(std::uint64_t last) {
 
 Look IslandsOptimiser::look_at(std::size_t island) const {
   const Optimiser& optimiser = *islands_[island].optimiser;
-  const auto of_run = [&](Member member) {
-    member.birth_id = member.birth_id * islands_.size() + island;
-    for (std::uint64_t& parent : member.parents) parent = parent * islands_.size() + island;
-    return member;
-  };
-  Look look;
-  for (const Member& member : optimiser.members()) look.members.push_back(of_run(member));
-  look.best = of_run(optimiser.best());
-  look.evaluations = optimiser.evaluations();
-  look.figures = optimiser.operator_probabilities();
-  look.state = optimiser.state();
-  return look;
+  return {optimiser.members(), optimiser.best(), optimiser.evaluations(),
+          optimiser.operator_probabilities(), optimiser.state()};
+}
+
+// To the others, of the island's generation.
+void IslandsOptimiser::show(std::size_t island, const Look& look) {
+  Shown& shown = shown_[islands_[island].optimiser->generation()];
+  shown.resize(islands_.size());
+  std::vector<Individual>& its = shown[island];
+  // The best so far beside all of its generation would say something of an older distribution.
+  const Optimiser& optimiser = *islands_[island].optimiser;
+  const bool beside = exchange_.best == 1 && optimiser.last_improvement() < optimiser.generation();
+  for (const Member& member : look.members) {
+    if (&member == look.members.data() && beside) continue;
+    Individual& individual = its.emplace_back();
+    individual.birth_id = member.birth_id;
+    individual.genome = member.genome;
+    individual.standing = standing_of(member);
+  }
+  sort_best_first(its);
+  its.resize((its.size() + exchange_.best - 1) / exchange_.best);
 }
 
 void IslandsOptimiser::tell_island(std::size_t i, std::span<const Score> scores) {
@@ -197,14 +211,9 @@ void IslandsOptimiser::tell_island(std::size_t i, std::span<const Score> scores)
   const std::uint64_t before = island.optimiser->generation();
   island.optimiser->tell(scores);
   island.under_way = false;
-  const std::uint64_t completed = island.optimiser->generation();
-  if (completed == before) return;
+  if (island.optimiser->generation() == before) return;
   island.ahead.push_back(look_at(i));
-  if (completed % kExchange != 0) return;
-  Bests& bests = exchanges_[completed / kExchange];
-  bests.resize(islands_.size());
-  bests[i].genome = island.ahead.back().best.genome;
-  bests[i].standing = standing_of(island.ahead.back().best);
+  show(i, island.ahead.back());
 }
 
 bool IslandsOptimiser::advance() {
@@ -221,9 +230,7 @@ bool IslandsOptimiser::advance() {
   }
   if (first || better_member(best_, before)) last_improvement_ = generation_;
   // What whoever is at this generation may still need.
-  while (!exchanges_.empty() && exchanges_.begin()->first + kAge < generation_ / kExchange) {
-    exchanges_.erase(exchanges_.begin());
-  }
+  while (shown_.begin()->first + exchange_.age < generation_) shown_.erase(shown_.begin());
   return true;
 }
 
@@ -287,34 +294,46 @@ std::string IslandsOptimiser::state() const {
   for (const Island& island : islands_) message.add_islands(island.now.state);
   message.set_generation(generation_);
   message.set_last_improvement(last_improvement_);
-  for (const auto& [exchange, bests] : exchanges_) {
-    if (exchange > generation_ / kExchange) break;  // of those who are ahead
-    if (message.exchanged_size() == 0) message.set_first_exchange(exchange);
-    for (const Individual& best : bests) save(best, *message.add_exchanged());
+  message.set_first_exchange(shown_.begin()->first);
+  for (const auto& [generation, shown] : shown_) {
+    if (generation >= generation_) break;  // the islands have them
+    for (const std::vector<Individual>& its : shown) {
+      for (const Individual& individual : its) save(individual, *message.add_exchanged());
+    }
   }
   return message.SerializeAsString();
 }
 
 Status IslandsOptimiser::restore(const OptimiserSetup& setup, const v1::IslandsState& message) {
   const int count = static_cast<int>(islands_.size());
-  if (message.islands_size() != count || message.exchanged_size() % count != 0 ||
-      message.generation() == 0) {
-    return Error{
-        "the saved state of the islands is damaged or belongs to another number of islands; resume "
-        "with the config of the run"};
-  }
+  const Error damaged{
+      "the saved state of the islands is damaged or belongs to another number of islands; resume "
+      "with the config of the run"};
+  if (message.islands_size() != count || message.generation() == 0) return damaged;
   generation_ = message.generation();
   last_improvement_ = message.last_improvement();
   for (std::size_t i = 0; i < islands_.size(); ++i) {
     const std::string& state = message.islands(static_cast<int>(i));
     ASSIGN_OR_RETURN(islands_[i].optimiser, restore_optimiser(setup_of(setup, i), state));
     islands_[i].now = look_at(i);
+    show(i, islands_[i].now);
     if (i == 0 || better_member(islands_[i].now.best, best_)) best_ = islands_[i].now.best;
   }
   const GeneSpace space(*setup.table, setup.genes);
-  for (int i = 0; i < message.exchanged_size(); ++i) {
-    ASSIGN_OR_RETURN(Individual best, load(message.exchanged(i), space));
-    exchanges_[message.first_exchange() + static_cast<std::uint64_t>(i / count)].push_back(best);
+  std::uint64_t generation = message.first_exchange(), last = 0;
+  for (const v1::Individual& saved : message.exchanged()) {
+    ASSIGN_OR_RETURN(Individual individual, load(saved, space));
+    const std::uint64_t island = individual.birth_id % islands_.size();
+    if (island < last) ++generation;
+    last = island;
+    shown_[generation].resize(islands_.size());
+    shown_[generation][island].push_back(std::move(individual));
+  }
+  const std::uint64_t age = std::min(exchange_.age, generation_ - 1);
+  for (std::uint64_t g = generation_ - age; g < generation_; ++g) {
+    if (shown_[g].empty() || std::ranges::any_of(shown_[g], &std::vector<Individual>::empty)) {
+      return damaged;
+    }
   }
   return {};
 }

@@ -1,7 +1,7 @@
 // Islands: several populations, each an optimiser of its own over the same genes, that wait for one
-// another as little as possible.  Every few generations an island takes over the best of another
-// one as it was that many generations before, from near and far by turns (steps of 1, 2, 4, ...
-// round a ring), unless its own is better.
+// another as little as possible.  Before each generation an island meets one or two others as they
+// were a generation or two before, near and far by turns (steps of 1, 2, 4, ... round a ring).
+// What it learns from them is its method's: Optimiser::meet().
 //
 // No order in which results arrive shows: what an island does follows from its own results and
 // from those that other islands had at stated generations.  So whoever drives islands may let each

@@ -46,6 +46,7 @@ struct NamedNumber {
 };
 
 class Islands;
+struct Individual;
 
 class Optimiser {
  public:
@@ -56,9 +57,9 @@ class Optimiser {
   // Scores in the order of the last ask().  Completes the generation, unless generation() stays.
   virtual void tell(std::span<const Score> scores) = 0;
 
-  // A genome from elsewhere that takes the place of one birth of the next generation.
+  // What others had, a generation of each, best first: for the next generation.
   // REQUIRES: generation() > 0, and every ask() has had its tell().
-  virtual void inject(const Genome&) {}
+  virtual void meet(std::span<const std::vector<Individual>>) {}
   // Where parts of the search need not wait for one another; null: there are none.
   virtual Islands* islands() { return nullptr; }
 
@@ -91,6 +92,8 @@ struct OptimiserSetup {
   std::size_t remembered = 16384;  // genomes that are not scored twice (SeenGenomes)
   // Members of the first generation beside the nominal one, best first.
   std::vector<Genome> given = {};
+  // Birth ids: the first, and how far the next is from one.
+  std::uint64_t first_birth = 0, births_apart = 1;
 };
 
 }  // namespace gapfarm

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <unordered_set>
+#include <utility>
 
 #include "common/base/try.h"
 #include "master/evolve/genetic/genetic_algorithm.h"
@@ -114,6 +115,8 @@ GeneticAlgorithm::GeneticAlgorithm(const OptimiserSetup& setup)
       given_(setup.given),
       run_seed_(setup.run_seed),
       noisy_(setup.noisy),
+      next_birth_id_(setup.first_birth),
+      births_apart_(setup.births_apart),
       seen_(setup.remembered) {}
 
 std::vector<Candidate> GeneticAlgorithm::ask() {
@@ -142,7 +145,6 @@ GeneticAlgorithm::Plan GeneticAlgorithm::plan_generation() {
     add_first_generation(plan);
   } else {
     plan.elites = choose_elites();
-    add_migrant(plan);
     if (restart_due()) {
       add_random(plan);
       last_restart_ = generation_ + 1;
@@ -166,7 +168,7 @@ void GeneticAlgorithm::add_first_generation(Plan& plan) {
   const auto add = [&](const Genome& genome, unsigned origin) {
     if (genome.empty() || plan.newborns.size() >= settings_.population) return;
     Newborn newborn;
-    newborn.individual.birth_id = next_birth_id_++;
+    newborn.individual.birth_id = next_birth();
     newborn.individual.genome = breeder_.space().snapped(genome);
     newborn.individual.origin = origin;
     plan.newborns.push_back(std::move(newborn));
@@ -176,20 +178,19 @@ void GeneticAlgorithm::add_first_generation(Plan& plan) {
   add_random(plan);
 }
 
-void GeneticAlgorithm::add_migrant(Plan& plan) {
-  if (migrant_.empty()) return;
-  Newborn newborn;
-  newborn.individual.birth_id = next_birth_id_++;
-  newborn.individual.genome = std::move(migrant_);
-  newborn.individual.origin = kMigrant;
-  plan.newborns.push_back(std::move(newborn));
-  migrant_.clear();
+std::uint64_t GeneticAlgorithm::next_birth() {
+  return std::exchange(next_birth_id_, next_birth_id_ + births_apart_);
+}
+
+void GeneticAlgorithm::meet(std::span<const std::vector<Individual>> others) {
+  others_.clear();
+  for (const auto& its : others) others_.insert(others_.end(), its.begin(), its.end());
 }
 
 void GeneticAlgorithm::add_random(Plan& plan) {
   while (plan.elites.size() + plan.newborns.size() < settings_.population) {
     Newborn newborn;
-    newborn.individual.birth_id = next_birth_id_++;
+    newborn.individual.birth_id = next_birth();
     Stream stream = stream_of(newborn.individual.birth_id);
     newborn.individual.genome = breeder_.space().random(stream);
     newborn.individual.origin = kRandom;
@@ -198,20 +199,22 @@ void GeneticAlgorithm::add_random(Plan& plan) {
 }
 
 void GeneticAlgorithm::add_children(Plan& plan) {
-  const Selection selection(settings_, population_.size());
+  std::vector<Individual> pool = std::exchange(others_, {});
+  pool.insert(pool.end(), population_.begin(), population_.end());
+  sort_best_first(pool);
+  const Selection selection(settings_, pool.size());
   while (plan.elites.size() + plan.newborns.size() < settings_.population) {
     Newborn newborn;
-    newborn.individual.birth_id = next_birth_id_++;
+    newborn.individual.birth_id = next_birth();
     Stream stream = stream_of(newborn.individual.birth_id);
-    Child child = breeder_.breed(population_, selection, stream);
+    Child child = breeder_.breed(pool, selection, stream);
     newborn.individual.genome = std::move(child.genome);
     newborn.individual.origin = child.origin;
     for (std::size_t rank : child.parents) {
-      newborn.individual.parents.push_back(population_[rank].birth_id);
+      newborn.individual.parents.push_back(pool[rank].birth_id);
     }
     newborn.arms = std::move(child.arms);
-    newborn.parent =
-        population_[*std::min_element(child.parents.begin(), child.parents.end())].standing;
+    newborn.parent = pool[*std::min_element(child.parents.begin(), child.parents.end())].standing;
     plan.newborns.push_back(std::move(newborn));
   }
 }

@@ -15,7 +15,7 @@ class GeneticAlgorithm final : public Optimiser {
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
-  void inject(const Genome& genome) override { migrant_ = breeder_.space().snapped(genome); }
+  void meet(std::span<const std::vector<Individual>> others) override;
 
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
@@ -44,7 +44,7 @@ class GeneticAlgorithm final : public Optimiser {
 
   Plan plan_generation();
   void add_first_generation(Plan& plan);
-  void add_migrant(Plan& plan);
+  std::uint64_t next_birth();
   void add_random(Plan& plan);
   void add_children(Plan& plan);
   void add_candidates(Plan& plan) const;
@@ -66,7 +66,8 @@ class GeneticAlgorithm final : public Optimiser {
   bool noisy_;
 
   std::uint64_t generation_ = 0;
-  std::uint64_t next_birth_id_ = 0;
+  std::uint64_t next_birth_id_;
+  std::uint64_t births_apart_;
   std::uint64_t evaluations_ = 0;
   std::uint64_t last_improvement_ = 0;
   std::uint64_t last_restart_ = 0;
@@ -75,8 +76,8 @@ class GeneticAlgorithm final : public Optimiser {
   Individual best_;
   Member best_member_;
   SeenGenomes seen_;
-  Genome migrant_;            // of the next generation; empty: none
-  std::optional<Plan> plan_;  // asked for, without scores yet
+  std::vector<Individual> others_;  // parents of the next generation, beside the population
+  std::optional<Plan> plan_;        // asked for, without scores yet
 };
 
 }  // namespace gapfarm

@@ -92,15 +92,15 @@ std::size_t CmaEs::population() const {
                   std::min(base << std::min<std::uint64_t>(restarts_, 20), kLargestPopulation));
 }
 
-CmaEs::Weights CmaEs::weights() const {
+CmaEs::Weights CmaEs::weights(Eigen::Index points) const {
   const double n = static_cast<double>(setup_.space.size());
-  const auto lambda = static_cast<double>(population());
+  const auto lambda = static_cast<double>(points);
   Weights w;
-  w.of_rank.resize(static_cast<Eigen::Index>(population()));
+  w.of_rank.resize(points);
   for (Eigen::Index i = 0; i < w.of_rank.size(); ++i) {
     w.of_rank[i] = std::log((lambda + 1) / 2) - std::log(static_cast<double>(i + 1));
   }
-  const auto parents = static_cast<Eigen::Index>(population() / 2);
+  const Eigen::Index parents = points / 2;
   auto best = w.of_rank.head(parents);
   auto worst = w.of_rank.tail(w.of_rank.size() - parents);
   best /= best.sum();
@@ -176,7 +176,10 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
   for (Eigen::Index i = 0; i < steps.cols(); ++i) {
     steps.col(i) = (to_vector(proposed[order[static_cast<std::size_t>(i)]]) - mean_) / sigma_;
   }
-  adapt(steps);
+  // After a restart each searches elsewhere.
+  if (restarts_ > 0) others_.clear();
+  adapt(steps, with_others(steps));
+  others_.clear();
   keep_levels_alive();
   ++generation_;
   const Standing& best = standings[order.front()];
@@ -192,8 +195,40 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
   if (flat || converged()) begin_again();
 }
 
-void CmaEs::adapt(const Eigen::MatrixXd& steps) {
-  const Weights w = weights();
+// By their rank in their own generation.
+Eigen::MatrixXd CmaEs::with_others(const Eigen::MatrixXd& steps) const {
+  if (others_.empty()) return steps;
+  const Axes axes = axes_of(covariance_);
+  std::vector<std::pair<double, Eigen::VectorXd>> ranked;
+  const auto add = [&](const Eigen::MatrixXd& its) {
+    for (Eigen::Index i = 0; i < its.cols(); ++i) {
+      ranked.emplace_back(static_cast<double>(i) / static_cast<double>(its.cols()), its.col(i));
+    }
+  };
+  add(steps);
+  for (const std::vector<Individual>& individuals : others_) {
+    Eigen::MatrixXd its(steps.rows(), static_cast<Eigen::Index>(individuals.size()));
+    for (Eigen::Index i = 0; i < its.cols(); ++i) {
+      its.col(i) = to_vector(individuals[static_cast<std::size_t>(i)].genome);
+    }
+    its.colwise() -= its.rowwise().mean().eval();
+    const Eigen::MatrixXd whitened =
+        axes.deviations.cwiseInverse().asDiagonal() * (axes.directions.transpose() * its);
+    const double unit = whitened.norm() / std::sqrt(static_cast<double>(its.size()));
+    if (unit > 0) add(its / unit);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  Eigen::MatrixXd all(steps.rows(), std::ssize(ranked));
+  for (Eigen::Index i = 0; i < all.cols(); ++i) {
+    all.col(i) = ranked[static_cast<std::size_t>(i)].second;
+  }
+  return all;
+}
+
+// The mean and its paths by `steps`, the covariance by `all`.
+void CmaEs::adapt(const Eigen::MatrixXd& steps, const Eigen::MatrixXd& all) {
+  const Weights w = weights(steps.cols()), shared = weights(all.cols());
   const double n = static_cast<double>(mean_.size());
   const Axes axes = axes_of(covariance_);
   const Eigen::Index parents = steps.cols() / 2;
@@ -209,15 +244,15 @@ void CmaEs::adapt(const Eigen::MatrixXd& steps) {
   path_c_ *= 1 - w.c_c;
   if (calm) path_c_ += std::sqrt(w.c_c * (2 - w.c_c) * w.mu_eff) * step;
   const double lost = calm ? 0 : w.c_c * (2 - w.c_c);
-  Eigen::VectorXd weights = w.of_rank;
-  for (Eigen::Index i = parents; i < weights.size(); ++i) {
+  Eigen::VectorXd weights = shared.of_rank;
+  for (Eigen::Index i = all.cols() / 2; i < weights.size(); ++i) {
     const double length =
-        (axes.directions.transpose() * steps.col(i)).cwiseQuotient(axes.deviations).squaredNorm();
+        (axes.directions.transpose() * all.col(i)).cwiseQuotient(axes.deviations).squaredNorm();
     weights[i] *= n / std::max(length, 1e-30);
   }
-  covariance_ = (1 - w.c_1 - w.c_mu * w.of_rank.sum() + w.c_1 * lost) * covariance_ +
-                w.c_1 * path_c_ * path_c_.transpose() +
-                w.c_mu * steps * weights.asDiagonal() * steps.transpose();
+  const double kept = 1 - shared.c_1 - shared.c_mu * shared.of_rank.sum() + shared.c_1 * lost;
+  covariance_ = kept * covariance_ + shared.c_1 * path_c_ * path_c_.transpose() +
+                shared.c_mu * all * weights.asDiagonal() * all.transpose();
   covariance_ = (covariance_ + covariance_.transpose().eval()) / 2;
   sigma_ *= std::exp(std::min(1.0, w.c_sigma / w.d_sigma * (path_sigma_.norm() / w.chi_n - 1)));
 }

@@ -11,6 +11,10 @@
 // and most draws fall there.  Narrow ones are learned from as drawn: at a minimum on a bound all
 // mirrored steps point inward, and the step size would run away.  The s.d. of a gene with levels
 // never falls below a fifth of a level, so that it does not freeze between two.
+//
+// Islands share what they learn of the covariance: to the own steps come those of the others'
+// generations, each seen from its own centre and in its own unit, so that it matters little how old
+// they are.  Mean and step size follow the own generation alone.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,6 +31,9 @@ class CmaEs final : public SearchMethod {
 
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
+  void meet(std::span<const std::vector<Individual>> others) override {
+    others_.assign(others.begin(), others.end());
+  }
   Genome taken(const Genome& migrant) const override;
   unsigned origin() const override { return kSampled; }
   std::vector<NamedNumber> figures() const override;
@@ -38,11 +45,12 @@ class CmaEs final : public SearchMethod {
     Eigen::VectorXd of_rank;  // the better half's positive, with sum 1; the others' negative
     double mu_eff = 0, c_sigma = 0, d_sigma = 0, c_c = 0, c_1 = 0, c_mu = 0, chi_n = 0;
   };
-  Weights weights() const;
+  Weights weights(Eigen::Index points) const;
   std::size_t population() const;
   void begin(Eigen::VectorXd mean);
   void begin_again();
-  void adapt(const Eigen::MatrixXd& steps);
+  Eigen::MatrixXd with_others(const Eigen::MatrixXd& steps) const;
+  void adapt(const Eigen::MatrixXd& steps, const Eigen::MatrixXd& all);
   void keep_levels_alive();
   bool converged() const;
 
@@ -53,6 +61,7 @@ class CmaEs final : public SearchMethod {
   double sigma_ = 0;
   Eigen::VectorXd mean_, path_sigma_, path_c_;
   Eigen::MatrixXd covariance_;
+  std::vector<std::vector<Individual>> others_;
   std::vector<double> bests_;  // least costs of the last generations
   // Of BIPOP: this start's, and what was spent on the two kinds before.
   std::size_t small_population_ = 0;  // 0: a growing one

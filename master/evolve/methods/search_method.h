@@ -42,6 +42,8 @@ class SearchMethod {
   virtual std::vector<Genome> propose(const StreamOf& stream_of) const = 0;
   virtual void learn(std::span<const Genome> proposed, std::span<const Standing> standings) = 0;
 
+  // What others had, a generation of each, best first: for the next learn().
+  virtual void meet(std::span<const std::vector<Individual>>) {}
   // What a genome from elsewhere, among the proposals, is learned as.
   virtual Genome taken(const Genome& migrant) const { return migrant; }
 

@@ -32,10 +32,24 @@ SearchOptimiser::SearchOptimiser(std::string kind, const OptimiserSetup& setup,
       noisy_(setup.noisy),
       elite_replicates_(setup.settings.elite_replicates),
       method_(std::move(method)),
+      next_birth_id_(setup.first_birth),
+      births_apart_(setup.births_apart),
       seen_(setup.remembered) {}
 
 unsigned SearchOptimiser::full_scores() const {
   return noisy_ ? std::max(1U, elite_replicates_) : 1;
+}
+
+// The best of them takes the place of a proposal, unless the own best is better.
+void SearchOptimiser::meet(std::span<const std::vector<Individual>> others) {
+  if (plan_) return;
+  method_->meet(others);
+  const Standing* least = &best_.standing;
+  for (const std::vector<Individual>& its : others) {
+    if (!better(its.front().standing, *least)) continue;
+    least = &its.front().standing;
+    migrant_ = its.front().genome;
+  }
 }
 
 std::vector<Candidate> SearchOptimiser::ask() {
@@ -50,7 +64,7 @@ SearchOptimiser::Plan SearchOptimiser::plan_generation() const {
     return Stream({.run_seed = run_seed_,
                    .purpose = Purpose::kEvolution,
                    .generation = generation_ + 1,
-                   .birth_id = next_birth_id_ + k});
+                   .birth_id = next_birth_id_ + k * births_apart_});
   });
   const unsigned wanted = replicates() ? wanted_scores() : 1;
   const std::span<Individual> incumbents = method_->incumbents();
@@ -62,11 +76,11 @@ SearchOptimiser::Plan SearchOptimiser::plan_generation() const {
   std::unordered_set<std::uint64_t> siblings;
   for (std::size_t k = 0; k < plan.proposed.size(); ++k) {
     Individual individual;
-    individual.birth_id = next_birth_id_ + k;
+    individual.birth_id = next_birth_id_ + k * births_apart_;
     individual.genome = placed(space_, plan.proposed[k]);
     individual.origin = method_->origin();
     if (k + 1 == plan.proposed.size() && !migrant_.empty()) {
-      individual.genome = placed(space_, migrant_);
+      individual.genome = migrant_;
       individual.origin = kMigrant;
       plan.proposed[k] = method_->taken(individual.genome);
     }
@@ -203,7 +217,7 @@ void SearchOptimiser::tell(std::span<const Score> scores) {
     if (incumbents[k].genome == plan.proposed[k])
       incumbents[k].birth_id = plan.individuals[k].birth_id;
   }
-  next_birth_id_ += plan.individuals.size();
+  next_birth_id_ += plan.individuals.size() * births_apart_;
   if (proposed_ == 0) round_.clear();
   proposed_ += plan.individuals.size();
   for (Individual& individual : plan.individuals) round_.push_back(std::move(individual));

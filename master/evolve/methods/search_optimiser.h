@@ -30,9 +30,7 @@ class SearchOptimiser final : public Optimiser {
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
-  void inject(const Genome& genome) override {
-    if (!plan_) migrant_ = genome;
-  }
+  void meet(std::span<const std::vector<Individual>> others) override;
 
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
@@ -87,7 +85,8 @@ class SearchOptimiser final : public Optimiser {
   std::unique_ptr<SearchMethod> method_;
 
   std::uint64_t generation_ = 0;
-  std::uint64_t next_birth_id_ = 0;
+  std::uint64_t next_birth_id_;
+  std::uint64_t births_apart_;
   std::uint64_t evaluations_ = 0;
   std::uint64_t last_improvement_ = 0;
   std::vector<Individual> round_;  // the last generation's or this one's so far, best first

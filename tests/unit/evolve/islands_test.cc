@@ -10,6 +10,7 @@
 #include "common/random/stream.h"
 #include "master/evolve/evolve.h"
 #include "tests/unit/evolve/members_digest.h"
+#include "tests/unit/evolve/search_functions.h"
 #include "tests/unit/evolve/toy_problems.h"
 
 namespace gapfarm::islands_test {
@@ -143,17 +144,43 @@ TEST_P(AnyOrder, GivesTheGenerationsOfIslandsThatWaitForOneAnother) {
   expect_same(rest, expected);  // from its saved state
 }
 
-TEST(Islands, ExchangeWhatIsBest) {
-  EvolutionSettings settings = settings_of(OptimiserKind::kGenetic);
-  ToyRun run(sphere(3), settings, 1);
-  std::set<std::string> origins;
-  for (int i = 0; i < 12; ++i) {
-    run.generation();
-    for (const Member& member : run.optimiser().members()) origins.insert(member.operators);
-    EXPECT_THAT(run.optimiser().members(), SizeIs(30));
-    EXPECT_EQ(run.optimiser().members().front().birth_id, run.optimiser().best().birth_id);
+TEST(Islands, LearnFromOneAnother) {
+  for (const OptimiserKind kind : {OptimiserKind::kGenetic, OptimiserKind::kCmaEs}) {
+    ToyRun run(sphere(3), settings_of(kind), 1);
+    bool from_elsewhere = false;
+    for (int i = 0; i < 12; ++i) {
+      run.generation();
+      for (const Member& member : run.optimiser().members()) {
+        from_elsewhere |= member.operators == "migrant";
+        for (const std::uint64_t parent : member.parents) {
+          from_elsewhere |= parent % 5 != member.birth_id % 5;
+        }
+      }
+      EXPECT_GE(run.optimiser().members().size(), 30U);
+      EXPECT_EQ(run.optimiser().members().front().birth_id, run.optimiser().best().birth_id);
+    }
+    EXPECT_TRUE(from_elsewhere);
   }
-  EXPECT_THAT(origins, testing::Contains("migrant"));
+}
+
+// What islands learn of a covariance together is learned as fast as by one population.
+TEST(Islands, LearnOneCovarianceTogether) {
+  const auto evaluations = [](unsigned islands) {
+    std::uint64_t sum = 0;
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      EvolutionSettings settings = settings_of(OptimiserKind::kCmaEs);
+      settings.optimiser.population = 80;
+      settings.islands = islands;
+      const SearchFunction function = instance(search_shapes()[1], 5, seed);  // ellipsoid
+      ToyRun run(toy_of(function), settings, seed);
+      const double wanted = function.least + 1e-6 * initial_gap(function, seed);
+      do run.generation();
+      while (run.optimiser().best().cost > wanted && run.optimiser().evaluations() < 50000);
+      sum += run.optimiser().evaluations();
+    }
+    return static_cast<double>(sum);
+  };
+  EXPECT_LT(evaluations(2), 1.2 * evaluations(1));
 }
 
 TEST(Islands, AreAsManyAsThePopulationHasRoomFor) {
