@@ -170,11 +170,10 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   return SocketFarm::create(std::move(base));
 }
 
-Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettings& settings,
-                                    CliContext& context) {
+Result<std::unique_ptr<Farm>> start_recorded(const FarmOptions& options,
+                                             const FarmSettings& settings, CliContext& context) {
   ASSIGN_OR_RETURN(auto farm, start_farm(options, settings, context));
-  auto recorded = context.work->over(*farm);
-  return RecordedWork{std::move(farm), std::move(recorded)};
+  return context.work->over(std::move(farm));
 }
 
 Result<int> print_dry_run(const std::string& would, Json facts, const FarmOptions& options,

@@ -95,6 +95,13 @@ std::vector<v1::TaskResult> Scheduler::finish() {
   return queue_.finish();
 }
 
+FarmTally Scheduler::tally() const {
+  FarmTally tally = tally_;
+  tally.compared = queue_.compared();
+  tally.copies = queue_.copied();
+  return tally;
+}
+
 void Scheduler::abandon() {
   cancel_all();
   queue_.abandon();
@@ -118,13 +125,13 @@ void Scheduler::cancel(const Losers& losers) {
 }
 
 void Scheduler::on_malformed(const std::string& peer) {
-  ++counts_.malformed;
+  ++tally_.malformed;
   const WorkerRecord* worker = registry_.find_peer(peer);
   if (worker != nullptr) report(FarmEvent::kBadMessage, worker->name, "sent a malformed message");
 }
 
 void Scheduler::on_other_protocol(const std::string& peer, std::uint32_t protocol) {
-  ++counts_.malformed;
+  ++tally_.malformed;
   const std::string reason = "the worker speaks protocol " + std::to_string(protocol) +
                              " and the master " + std::to_string(kProtocol) +
                              "; use the same build on both sides";
@@ -226,7 +233,7 @@ void Scheduler::keep_only(WorkerRecord& worker, const List& keeps, double held_s
   worker.holds = std::move(kept);
   // From the last to the first, so that they wait in the order in which they went out.
   for (auto attempt = lost.rbegin(); attempt != lost.rend(); ++attempt) {
-    if (queue_.give_back(worker.id, *attempt)) ++counts_.retries;
+    if (queue_.give_back(worker.id, *attempt)) ++tally_.retries;
   }
   if (!lost.empty()) line_up(worker);
 }
@@ -246,7 +253,7 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
 
 bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double now) {
   if (result->epoch() != options_.epoch) {
-    ++counts_.foreign;
+    ++tally_.foreign;
     return true;
   }
   const std::uint64_t attempt = result->attempt_id();
@@ -254,7 +261,7 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double no
   const Committed committed = queue_.commit(registry_.identity(worker), result);
   if (committed.kind == Commit::kNoAnswer) {
     // Broken or lying: nothing else that it says is worth waiting for.
-    ++counts_.malformed;
+    ++tally_.malformed;
     const std::string reason = "it answered a task with something that is no result of it";
     post(worker.peer).mutable_refusal()->set_reason(reason);
     dismiss(worker, FarmEvent::kBadMessage, "is refused: " + reason);
@@ -274,11 +281,11 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double no
 }
 
 void Scheduler::on_committed(const Committed& committed) {
-  if (committed.kind == Commit::kForeign) ++counts_.foreign;
-  if (committed.kind == Commit::kLate) ++counts_.late;
+  if (committed.kind == Commit::kForeign) ++tally_.foreign;
+  if (committed.kind == Commit::kLate) ++tally_.late;
   cancel(committed.losers);
   if (!committed.disagreement) return;
-  ++counts_.disagreements;
+  ++tally_.alarms;
   const Disagreement& d = *committed.disagreement;
   report(FarmEvent::kDisagreement, d.second->name,
          d.question + " has two answers: " + d.first->name + " on " + d.first->host +
@@ -290,7 +297,7 @@ void Scheduler::on_dropped(WorkerRecord& worker, const v1::ResultBatch& batch) {
   if (batch.epoch() != options_.epoch) return;
   for (std::uint64_t attempt : batch.dropped()) {
     if (drop_holding(worker, attempt)) line_up(worker);
-    if (queue_.give_back(worker.id, attempt)) ++counts_.retries;
+    if (queue_.give_back(worker.id, attempt)) ++tally_.retries;
   }
 }
 
@@ -308,7 +315,7 @@ void Scheduler::take_offers() {
     const Committed committed = queue_.commit_question(offered.by, offered.answer.question(),
                                                        offered.answer.mutable_result());
     if (committed.kind == Commit::kForeign) continue;
-    if (committed.kind == Commit::kDone) ++counts_.offered;
+    if (committed.kind == Commit::kDone) ++tally_.handed_over;
     on_committed(committed);
   }
   offers_.clear();
@@ -330,7 +337,7 @@ void Scheduler::on_unsent(const std::vector<Outgoing>& messages) {
     if (worker == nullptr) continue;
     for (const v1::Job& job : message.envelope.batch().jobs()) {
       drop_holding(*worker, job.attempt_id());
-      if (queue_.give_back(worker->id, job.attempt_id())) ++counts_.retries;
+      if (queue_.give_back(worker->id, job.attempt_id())) ++tally_.retries;
     }
   }
   for (const Outgoing& message : messages) {
@@ -358,9 +365,9 @@ void Scheduler::on_process_end(const WorkerEnd& end) {
   if (end.epoch != options_.epoch || end.attempt == 0) return;
   Blamed blamed = queue_.blame(*departed->second, end.attempt, end.cause, end.failure);
   departed_.erase(departed);
-  if (end.cause == EndCause::kHung) ++counts_.hung;
+  if (end.cause == EndCause::kHung) ++tally_.hung;
   if (!blamed.quarantined) return;
-  ++counts_.quarantined;
+  ++given_up_;
   blamed.reason += values_of_task(blamed.task);
   if (quarantine_reasons_.size() >= kReasonsKept) quarantine_reasons_.pop_front();
   quarantine_reasons_.push_back(blamed.reason);

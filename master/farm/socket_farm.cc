@@ -275,24 +275,26 @@ std::vector<WorkerStatus> SocketFarm::workers() const { return impl_->scheduler-
 
 std::vector<FleetStatus> SocketFarm::fleets() const { return impl_->scheduler->fleet_status(); }
 
-std::uint64_t SocketFarm::retries() const { return impl_->scheduler->counts().retries; }
+std::vector<std::string> SocketFarm::endpoints() const { return impl_->endpoints; }
 
-const std::vector<std::string>& SocketFarm::endpoints() const { return impl_->endpoints; }
+FarmTally SocketFarm::tally() const {
+  FarmTally tally = impl_->scheduler->tally();
+  const LinkCounts links = impl_->socket->link_counts();
+  tally.links = links.accepted;
+  tally.refused_keys = links.refused_keys;
+  tally.failed_handshakes = links.failed_handshakes;
+  tally.dropped_links = links.dropped;
+  return tally;
+}
 
-std::uint64_t SocketFarm::compared() const { return impl_->scheduler->compared(); }
+std::uint64_t SocketFarm::given_up() const { return impl_->scheduler->given_up(); }
 
-std::uint64_t SocketFarm::copied() const { return impl_->scheduler->copied(); }
+std::string SocketFarm::numeric_class() const {
+  return impl_->scheduler->workers().numeric_class();
+}
 
 const std::deque<std::string>& SocketFarm::quarantine_reasons() const {
   return impl_->scheduler->quarantine_reasons();
-}
-
-const SchedulerCounts& SocketFarm::counts() const { return impl_->scheduler->counts(); }
-
-LinkCounts SocketFarm::link_counts() const { return impl_->socket->link_counts(); }
-
-const std::string& SocketFarm::numeric_class() const {
-  return impl_->scheduler->workers().numeric_class();
 }
 
 std::vector<int> SocketFarm::local_pids() const {

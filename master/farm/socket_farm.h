@@ -11,7 +11,6 @@
 #include "common/base/result.h"
 #include "common/net/socket.h"
 #include "common/process/stop.h"
-#include "master/farm/answer_watch.h"
 #include "master/farm/farm.h"
 #include "master/farm/scheduler.h"
 
@@ -42,7 +41,7 @@ struct SocketFarmOptions {
 Status check_sendable(const v1::Problem& problem);
 
 // Belongs to the thread that made it, which must live as long: the local workers die with it.
-class SocketFarm : public Farm, public AnswerSource {
+class SocketFarm : public Farm {
  public:
   // Listens and starts the local workers.  Errors: an endpoint that cannot be bound, no worker
   // program, neither local workers nor an endpoint.
@@ -64,18 +63,13 @@ class SocketFarm : public Farm, public AnswerSource {
   void watch_answers(AnswerWatcher watcher) override;
   std::vector<WorkerStatus> workers() const override;
   std::vector<FleetStatus> fleets() const override;
-  std::uint64_t retries() const override;
+  std::vector<std::string> endpoints() const override;
+  FarmTally tally() const override;
+  std::uint64_t given_up() const override;
+  std::string numeric_class() const override;
 
-  // As bound: ports are filled in.
-  const std::vector<std::string>& endpoints() const;
-  const SchedulerCounts& counts() const;
-  LinkCounts link_counts() const;
   // See Scheduler.
-  std::uint64_t compared() const;
-  std::uint64_t copied() const;
   const std::deque<std::string>& quarantine_reasons() const;
-  // Of the run; empty before the first worker.
-  const std::string& numeric_class() const;
   // Pids of the running local workers.
   std::vector<int> local_pids() const;
 

@@ -142,7 +142,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   FarmEventKeeper events(store, watcher);
   auto farm = request.open_farm([&](const FarmEvent& event) { events.keep(event); });
   if (!farm) return stopped_by(store, farm.error());
-  auto optimiser = optimiser_of(*inputs, request, (*farm)->farm(), watcher);
+  auto optimiser = optimiser_of(*inputs, request, **farm, watcher);
   if (!optimiser) {
     events.flush();
     Progress last;
@@ -159,7 +159,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,
                               watcher);
   progress.watch(&request.log, &events);
-  FarmBackend backend((*farm)->farm(), request.problem, request.config.seed, progress);
+  FarmBackend backend(**farm, request.problem, request.config.seed, progress);
   StoreSink sink(store, request.problem, **farm, progress);
   EvolveOptions options;
   options.settings = request.config.evolution;
@@ -176,7 +176,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));
   if (summary.stopped()) return summary;
   if (summary.evolved.best && summary.evolved.best->outcome == v1::OK) {
-    const Status left = leave_model(store, request, *inputs, (*farm)->farm(), watcher, summary);
+    const Status left = leave_model(store, request, *inputs, **farm, watcher, summary);
     // Finished is what has its model; resumed, it only leaves that behind.
     if (!left) return stopped_by(store, left.error(), progress.now());
   }

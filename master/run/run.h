@@ -42,7 +42,7 @@ struct RunRequest {
   const Problem& problem;
   Log& log;
   // Called once all inputs are known to be sound.  What happens in the farm goes to `keep`.
-  std::function<Result<std::unique_ptr<FarmOfRun>>(std::function<void(const FarmEvent&)> keep)>
+  std::function<Result<std::unique_ptr<Farm>>(std::function<void(const FarmEvent&)> keep)>
       open_farm;
   std::function<bool()> stop_requested;  // may be empty; the farm is notified separately
 };

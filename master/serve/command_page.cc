@@ -137,7 +137,7 @@ std::string stages_section(const CommandRecord& r, const std::vector<AnsweredSta
 
 std::string workers_section(const CommandRecord& r) {
   std::string workers;
-  for (const StoredWorker& w : r.workers) {
+  for (const WorkerStatus& w : r.workers) {
     workers += R"(<tr><th scope="row">)" + html_escaped(w.name) + "</th>" +
                list_cell("host", html_escaped(w.host)) + list_cell("state", html_escaped(w.state)) +
                list_cell("finished", number_text(static_cast<double>(w.finished), 9), true) +

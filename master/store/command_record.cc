@@ -70,12 +70,12 @@ CommandRecord command_record_of(const Json& json) {
   return LenientFields::read<CommandRecord>(json, kRecord);
 }
 
-Json workers_json(const std::vector<StoredWorker>& workers) {
+Json workers_json(const std::vector<WorkerStatus>& workers) {
   return FieldWriter::list(workers, kWorker);
 }
 
-std::vector<StoredWorker> workers_of(const Json& json) {
-  return LenientFields::list<StoredWorker>(json, kWorker);
+std::vector<WorkerStatus> workers_of(const Json& json) {
+  return LenientFields::list<WorkerStatus>(json, kWorker);
 }
 
 Json fleets_json(const std::vector<FleetStatus>& fleets) {

@@ -45,7 +45,7 @@ struct CommandRecord {
   std::optional<double> time_left_s;            // of the whole
   std::uint64_t remembered = 0, simulated = 0;  // answers at hand, and new ones
   std::string waiting;                          // what it waits for; empty: nothing
-  std::vector<StoredWorker> workers;
+  std::vector<WorkerStatus> workers;
   std::vector<FleetStatus> fleets;
   std::string listen;  // for workers: the first tcp:// endpoint; empty: none
   double began_unix_s = 0, heartbeat_unix_s = 0;

@@ -47,10 +47,10 @@ void declare_overrides(EvolutionOverrides& overrides, CLI::App& app) {
       ->check(CLI::Range(2, 1000000, "2+"));
 }
 
-Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config& config,
-                                             const EvolutionOptions& options, Log& log,
-                                             const std::function<void(const FarmEvent&)>& keep,
-                                             CliContext& context) {
+Result<std::unique_ptr<Farm>> open_farm(const RunStore& store, const Config& config,
+                                        const EvolutionOptions& options, Log& log,
+                                        const std::function<void(const FarmEvent&)>& keep,
+                                        CliContext& context) {
   SocketFarmOptions base;
   base.epoch = store.epoch();
   base.numeric_class = store.info().numeric_class;
@@ -66,7 +66,7 @@ Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config
       context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
     }
   }
-  return farm_of_run(std::move(farm));
+  return std::unique_ptr<Farm>(std::move(farm));
 }
 
 Result<std::unique_ptr<WorkersBeside>> start_beside(const EvolutionOptions& options,
@@ -168,7 +168,7 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   OnConsole watcher(context.console);
   std::unique_ptr<PageAlong> page;
   std::unique_ptr<WorkersBeside> beside;
-  const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<FarmOfRun>> {
+  const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<Farm>> {
     ASSIGN_OR_RETURN(auto opened, open_page(options.page, store.run(), context));
     page = std::move(opened);
     auto made = open_farm(store, config, options, log, keep, context);

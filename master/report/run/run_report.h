@@ -11,6 +11,7 @@
 
 #include "common/base/result.h"
 #include "master/diagnose/result/diagnosis.h"
+#include "master/farm/farm.h"
 
 namespace gapfarm {
 
@@ -55,11 +56,7 @@ struct GeneDensity {
   std::vector<double> best;                   // of those generations
 };
 
-struct RunWorker {
-  std::string name, host, state;
-  unsigned jobs = 0;
-  std::uint64_t finished = 0;
-  double rate_per_s = 0;
+struct RunWorker : WorkerStatus {
   std::string failure;  // the last of this name, with its time; empty: none
 };
 

@@ -158,7 +158,7 @@ TEST(Scheduler, GivesASilentWorkersJobsToOthersWithoutBlame) {
     desk.scheduler.on_tick(desk.now);
   }
   EXPECT_TRUE(desk.reported(FarmEvent::kSilent));
-  EXPECT_EQ(desk.scheduler.counts().retries, 2u);
+  EXPECT_EQ(desk.scheduler.tally().retries, 2u);
   EXPECT_EQ(desk.scheduler.worker_status().at(0).name, "b");
   EXPECT_EQ(desk.scheduler.worker_status().at(0).jobs, 2u);
   // It was only cut off: unknown by now, it is asked who it is, and its answers do not count.
@@ -201,11 +201,11 @@ TEST(Scheduler, TakesNoAnswerTwiceNorFromAnotherEpochOrWorker) {
   wrong.set_attempt_id(job.attempt_id() + 1000);
   desk.answer(owner, wrong);
   desk.answer(owner, job, 7, v1::OUTCOME_UNSPECIFIED);
-  EXPECT_EQ(desk.scheduler.counts().foreign, 5u);
+  EXPECT_EQ(desk.scheduler.tally().foreign, 5u);
   EXPECT_FALSE(desk.scheduler.finished());
   desk.answer(owner, job, 7, v1::INVALID_REQUEST);
   desk.answer(owner, job);
-  EXPECT_EQ(desk.scheduler.counts().late, 1u);
+  EXPECT_EQ(desk.scheduler.tally().late, 1u);
   EXPECT_EQ(desk.scheduler.finish()[0].outcome(), v1::INVALID_REQUEST);
   desk.scheduler.start("", echo_tasks(1));
   desk.answer(owner, job);
@@ -256,7 +256,7 @@ TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
   }
   ASSERT_TRUE(desk.scheduler.finished());
   EXPECT_TRUE(desk.reported(FarmEvent::kQuarantined));
-  EXPECT_EQ(desk.scheduler.counts().quarantined, 1u);
+  EXPECT_EQ(desk.scheduler.given_up(), 1u);
   const auto results = desk.scheduler.finish();
   EXPECT_EQ(results[0].outcome(), v1::OK);
   EXPECT_EQ(results[1].outcome(), v1::WORKER_FAILED);
@@ -303,7 +303,7 @@ TEST(Scheduler, NeverBlamesAJobForPoliteExits) {
     desk.scheduler.on_process_end({name, EndCause::kLeft, 7, 0, "exited with status 0"});
   }
   EXPECT_FALSE(desk.scheduler.finished());
-  EXPECT_EQ(desk.scheduler.counts().quarantined, 0u);
+  EXPECT_EQ(desk.scheduler.given_up(), 0u);
 }
 
 TEST(Scheduler, AReturningWorkerKeepsWhatItStillHolds) {

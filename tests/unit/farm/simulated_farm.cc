@@ -348,8 +348,7 @@ std::vector<v1::TaskResult> SimulatedFarm::run(const std::vector<v1::Task>& task
 }
 
 std::uint64_t SimulatedFarm::taken() const {
-  const SchedulerCounts& counts = scheduler_->counts();
-  std::uint64_t taken = counts.offered + counts.quarantined;
+  std::uint64_t taken = scheduler_->tally().handed_over + scheduler_->given_up();
   for (const WorkerStatus& status : scheduler_->worker_status()) taken += status.finished;
   return taken;
 }
