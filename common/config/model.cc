@@ -6,7 +6,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/try.h"
-#include "common/config/residual_section.h"
 #include "common/config/sections.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
