@@ -105,11 +105,11 @@ Status add_densities(const RunReader& reader, const Problem& problem,
   std::erase_if(report->densities, [](const GeneDensity& d) { return d.generations.empty(); });
   // A front is shown as one.
   std::vector<StoredIndividual> elite = last;
-  ASSIGN_OR_RETURN(const RunFront front, run_front(reader, generations));
+  ASSIGN_OR_RETURN(report->front, run_front(reader, generations));
+  const RunFront& front = report->front;
   if (!front.members.empty()) {
     elite = front.members;
     std::swap(elite.front(), elite[front.knee]);
-    report->front = front_view(front, generations);
   }
   report->elite = run_elite(problem, elite);
   report->sample = run_sample(problem, sample);

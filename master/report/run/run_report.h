@@ -11,7 +11,7 @@
 
 #include "common/base/result.h"
 #include "master/diagnose/result/diagnosis.h"
-#include "master/farm/farm.h"
+#include "master/store/run_reader.h"
 
 namespace gapfarm {
 
@@ -84,23 +84,6 @@ struct RunElite {
   };
   std::vector<Axis> axes;
   std::vector<Line> lines;
-};
-
-// Of several objectives, each in its own sense: what a search trades off.
-struct RunFrontView {
-  struct Objective {
-    std::string name;
-    bool maximise = false;
-  };
-  struct Member {
-    std::uint64_t birth_id = 0;
-    std::vector<double> values;
-  };
-  std::vector<Objective> objectives;  // empty: the run has one fitness
-  std::vector<Member> members;        // of the last generation's front
-  std::size_t knee = 0;
-  std::vector<double> reference;                              // of the hypervolume
-  std::vector<std::pair<std::uint64_t, double>> hypervolume;  // by generation
 };
 
 // What the evaluations say of the genes.
@@ -185,7 +168,7 @@ struct RunReport {
   std::optional<RunGenome> looked_up;  // the one that was asked for
   std::string without_looked_up;       // why there is none, when one was asked for
   RunElite elite;
-  RunFrontView front;
+  RunFront front;
   RunSample sample;
   RunFarm farm;
   std::size_t trials = 0;    // of the log
