@@ -244,17 +244,8 @@ void LongCommand::show(bool news) {
 void LongCommand::write_record() {
   if (!keeps()) return;
   written_s_ = steady_now_s();
-  const ProgressView view = progress_.at(written_s_);
-  record_.stage = view.stage;
-  record_.stage_number = view.number;
-  record_.stages = view.stages;
-  record_.done = view.done;
-  record_.total = view.total;
-  record_.share = record_.state == "finished" ? 1 : view.share;
-  record_.rate_per_s = view.rate_per_s;
-  record_.time_left_s = view.time_left_s;
-  record_.remembered = view.remembered;
-  record_.simulated = view.simulated;
+  static_cast<ProgressView&>(record_) = progress_.at(written_s_);
+  if (record_.state == "finished") record_.share = 1;
   record_.waiting = waiting_;
   record_.fleets = fleets_;
   record_.workers = workers_;

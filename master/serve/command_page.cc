@@ -27,7 +27,7 @@ std::string command_tiles(const CommandRecord& r) {
   std::string html = R"(<dl class="tiles" id="tiles" data-live>)";
   html += tile_of("Done", percent_text(r.share), bar_svg(r.share, "fill-named"));
   html +=
-      tile_of("Stage", fmt::format("{} of {}", r.stage_number, r.stages),
+      tile_of("Stage", fmt::format("{} of {}", r.number, r.stages),
               html_escaped(r.stage) + (r.total > 0 ? fmt::format(": {} of {}{}", r.done, r.total,
                                                                  simulates ? " simulations" : "")
                                                    : ""));
@@ -74,8 +74,8 @@ std::string finding_html(const Finding& found) {
 // Whether stage `k` of the plan is over, in work or to come, and how long it took.
 std::string stage_text(const CommandRecord& r, std::size_t k) {
   const double began_s = r.plan[k].began_unix_s;
-  const bool last = k + 1 >= r.stage_number;
-  if (k + 1 > r.stage_number) return r.state == "running" ? "to come" : "not reached";
+  const bool last = k + 1 >= r.number;
+  if (k + 1 > r.number) return r.state == "running" ? "to come" : "not reached";
   if (began_s == 0) return "not needed";
   double ended_s = r.heartbeat_unix_s;
   for (std::size_t j = k + 1; j < r.plan.size() && !last; ++j) {
@@ -92,7 +92,7 @@ std::string stage_text(const CommandRecord& r, std::size_t k) {
 std::string findings_list(const CommandRecord& r) {
   std::string html = R"(<ol class="stages">)";
   for (std::size_t k = 0; k < r.plan.size(); ++k) {
-    const bool now = r.state == "running" && k + 1 == r.stage_number;
+    const bool now = r.state == "running" && k + 1 == r.number;
     html +=
         fmt::format(R"(<li{}><h3>{} <small>{}</small></h3>)", now ? R"( aria-current="step")" : "",
                     html_escaped(r.plan[k].name), stage_text(r, k));

@@ -39,7 +39,9 @@ constexpr auto kFleet = [](auto& v, auto& row) {
 constexpr auto kRecord = [](auto& v, auto& row) {
   FIELDS(command, state);
   v.field("stop_reason", row.reason);
-  FIELDS(stage, stage_number, stages);
+  FIELDS(stage);
+  v.field("stage_number", row.number);
+  FIELDS(stages);
   v.list("plan", row.plan, kStage);
   v.list("findings", row.findings, kStageFinding);
   FIELDS(done, total, share, rate_per_s, time_left_s, remembered, simulated, waiting);

@@ -259,8 +259,8 @@ std::string command_screen(const CommandRecord& record, const std::string& folde
   if (!why.empty()) text += ": " + printable(why);
   text += "\n";
   const bool over = record.state == "finished";
-  if (!over && record.stage_number > 0) {
-    text += label(console, "stage") + std::to_string(record.stage_number) + " of " +
+  if (!over && record.number > 0) {
+    text += label(console, "stage") + std::to_string(record.number) + " of " +
             std::to_string(record.stages) + ": " + printable(record.stage);
     if (record.total > 0) {
       text += ", " + std::to_string(record.done) + " of " + std::to_string(record.total);
