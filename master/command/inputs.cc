@@ -164,7 +164,7 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   base.job_limits = {settings.failure_limit, settings.kill_limit};
   base.copies.audit_share = settings.audit_share;
   base.copies.straggler_factor = settings.straggler_factor;
-  base.allow_mixed_numeric_classes = settings.allow_mixed_numeric_classes;
+  base.admittance.allow_mixed_numeric_classes = settings.allow_mixed_numeric_classes;
   base.stop = &context.stop;
   if (!base.on_event) report_to(context.console, base);
   return SocketFarm::create(std::move(base));

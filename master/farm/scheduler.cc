@@ -55,7 +55,7 @@ void note_pace(WorkerRecord& worker, std::uint64_t attempt, double wall, double 
 Scheduler::Scheduler(SchedulerOptions options)
     : options_(std::move(options)),
       registry_(options_.admittance),
-      queue_(options_.limits, options_.copies) {}
+      queue_(options_.job_limits, options_.copies) {}
 
 void Scheduler::report(FarmEvent::Kind kind, const std::string& worker,
                        const std::string& text) const {
@@ -195,12 +195,15 @@ void Scheduler::on_hello(const std::string& peer, const v1::Hello& hello, double
   }
   WorkerRecord& worker = *admission.worker;
   if (!hello.replaces().empty() && hello.replaces() != worker.name) {
-    on_process_end(
-        {hello.replaces(), cause_of(hello.replaced_end()), hello.replaced_epoch(),
-         hello.replaced_attempt(),
-         "its process ended and was replaced by " + worker.name +
-             (hello.replaced_failure().empty() ? "" : ": " + first_line(hello.replaced_failure())),
-         hello.replaced_failure()});
+    ProcessEnded end;
+    end.name = hello.replaces();
+    end.cause = cause_of(hello.replaced_end());
+    end.epoch = hello.replaced_epoch();
+    end.attempt = hello.replaced_attempt();
+    end.failure = hello.replaced_failure();
+    end.text = "its process ended and was replaced by " + worker.name +
+               (end.failure.empty() ? "" : ": " + first_line(end.failure));
+    on_process_end(end);
   }
   if (admission.returning) {
     // Whatever else was under way to it, or its answers on the way here, may be lost.
@@ -357,7 +360,7 @@ void Scheduler::dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::s
   report(kind, name, text);
 }
 
-void Scheduler::on_process_end(const WorkerEnd& end) {
+void Scheduler::on_process_end(const ProcessEnded& end) {
   WorkerRecord* worker = registry_.find_name(end.name);
   if (worker != nullptr) dismiss(*worker, FarmEvent::kDied, end.text);
   const auto departed = departed_.find(end.name);

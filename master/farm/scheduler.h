@@ -48,7 +48,7 @@ struct JobEvent {
 struct SchedulerOptions {
   std::uint64_t epoch = 1;  // of this life of the master; > 0
   Admittance admittance;
-  JobLimits limits;
+  JobLimits job_limits;
   CopyOptions copies;
   unsigned window = 2;  // jobs in a worker's hand
   // Tasks shorter than a round trip need more in hand: as many as last so long, at most window_max.
@@ -62,16 +62,6 @@ struct SchedulerOptions {
   std::optional<std::uint64_t> shuffle_seed;
   std::function<void(const FarmEvent&)> on_event;
   std::function<void(const JobEvent&)> on_job;  // may be empty
-};
-
-// How a worker's process ended, and what it had in work.
-struct WorkerEnd {
-  std::string name;
-  EndCause cause = EndCause::kLeft;
-  std::uint64_t epoch = 0;
-  std::uint64_t attempt = 0;  // 0: nothing
-  std::string text;
-  std::string failure = {};  // what it reported of why it ended (ProcessEnded)
 };
 
 struct Outgoing {
@@ -108,7 +98,7 @@ class Scheduler {
   void on_other_protocol(const std::string& peer, std::uint32_t protocol);
   // These messages did not go out: nobody is there, or does not take its messages any more.
   void on_unsent(const std::vector<Outgoing>& messages);
-  void on_process_end(const WorkerEnd& end);
+  void on_process_end(const ProcessEnded& end);
   // Gives out jobs, without judging anybody.
   void dispatch(double now);
   // Judges silence and gives out jobs.  Call when all messages that have arrived are handled: what

@@ -82,17 +82,9 @@ Status SocketFarm::Impl::open() {
   if (options.local_workers == 0 && options.listen.empty()) {
     return Error{"the farm has no local workers and listens nowhere; give it one or the other"};
   }
-  SchedulerOptions settings;
+  SchedulerOptions settings = options;
   settings.epoch = unique_epoch(options.epoch);
-  settings.admittance = {build_info().fingerprint, options.numeric_class,
-                         options.allow_mixed_numeric_classes};
-  settings.window = options.window;
-  settings.heartbeat_interval_s = options.heartbeat_interval_s;
-  settings.silence_limit_s = options.silence_limit_s;
-  settings.limits = options.job_limits;
-  settings.copies = options.copies;
-  settings.shuffle_seed = options.shuffle_seed;
-  settings.on_job = options.on_job;
+  settings.admittance.fingerprint = build_info().fingerprint;
   settings.on_event = [this](const FarmEvent& event) { on_event(event); };
   scheduler = std::make_unique<Scheduler>(std::move(settings));
 
@@ -127,7 +119,7 @@ void SocketFarm::Impl::reap(double now) {
   }
   if (!locals) return;
   for (const ProcessEnded& end : locals->pool().reap(now)) {
-    scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text, end.failure});
+    scheduler->on_process_end(end);
     if (end.gave_up) {
       if (last_trouble.empty()) last_trouble = end.text;
       on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again", ""});

@@ -16,25 +16,16 @@
 
 namespace gapfarm {
 
-struct SocketFarmOptions {
+// Of the scheduler's the epoch counts lives of the master so far, below 2^24; the build's
+// fingerprint is filled in; without `on_event` what went wrong goes to stderr.
+struct SocketFarmOptions : SchedulerOptions {
   unsigned local_workers = 0;       // processes to start on this machine
   std::vector<std::string> listen;  // endpoints for workers that come by themselves
   LinkSecurity security;            // of tcp:// endpoints; without it they cannot be listened on
   LinkLimits limits;
   std::string worker_program;  // empty: find_worker_program()
-  std::uint64_t epoch = 0;     // lives of the master so far, below 2^24
-  std::string numeric_class;   // of the run; empty: the first worker's
-  bool allow_mixed_numeric_classes = false;
-  unsigned window = 2;
-  double heartbeat_interval_s = 1;
-  double silence_limit_s = 10;
   ProcessLimits local_limits;  // of the local workers; others have their own supervisors
-  JobLimits job_limits;
-  CopyOptions copies;
-  std::optional<std::uint64_t> shuffle_seed;       // jobs go out in shuffled order
-  StopSource* stop = nullptr;                      // ends run(); not owned, outlives the farm
-  std::function<void(const FarmEvent&)> on_event;  // empty: what went wrong goes to stderr
-  std::function<void(const JobEvent&)> on_job;     // may be empty
+  StopSource* stop = nullptr;  // ends run(); not owned, outlives the farm
 };
 
 // Error: a problem too large for a message to a worker.

@@ -53,7 +53,7 @@ Result<std::unique_ptr<Farm>> open_farm(const RunStore& store, const Config& con
                                         CliContext& context) {
   SocketFarmOptions base;
   base.epoch = store.epoch();
-  base.numeric_class = store.info().numeric_class;
+  base.admittance.numeric_class = store.info().numeric_class;
   base.shuffle_seed = options.shuffle;
   report_to(log, base);
   base.on_event = [keep, next = base.on_event](const FarmEvent& event) {
