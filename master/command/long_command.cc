@@ -47,15 +47,15 @@ std::string state_folder() {
   return {};
 }
 
-std::string state_of(int exit_code) {
+bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
+
+}  // namespace
+
+std::string state_of_exit(int exit_code) {
   if (exit_code == kExitDone || exit_code == kExitQuarantined) return "finished";
   if (exit_code == kExitResumable || exit_code > kExitSignalBase) return "stopped";
   return "failed";
 }
-
-bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
-
-}  // namespace
 
 std::string command_line() {
   std::string text = "gapfarm";
@@ -274,7 +274,7 @@ void LongCommand::end(int exit_code) {
                               now_.remembered + now_.simulated,
                               answer_file(place_.folder).string()));
   }
-  record_.state = state_of(exit_code);
+  record_.state = state_of_exit(exit_code);
   record_.reason = record_.state == "stopped" ? "stopped by request"
                    : record_.state == "failed"
                        ? "failed with exit code " + std::to_string(exit_code)
