@@ -95,13 +95,6 @@ std::vector<v1::TaskResult> Scheduler::finish() {
   return queue_.finish();
 }
 
-FarmTally Scheduler::tally() const {
-  FarmTally tally = tally_;
-  tally.compared = queue_.compared();
-  tally.copies = queue_.copied();
-  return tally;
-}
-
 void Scheduler::abandon() {
   cancel_all();
   queue_.abandon();
