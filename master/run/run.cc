@@ -100,8 +100,8 @@ Status write_end(RunStore& store, Progress progress, RunState state, const std::
 }
 
 // How the run's results do on what was held out.
-Result<std::vector<Validated>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
-                                            const Genome& best) {
+Result<std::vector<ScoreRow>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
+                                           const Genome& best) {
   ASSIGN_OR_RETURN(const auto checkpoint, store.checkpoint());
   std::vector<Genome> stages;
   if (checkpoint) stages = stage_results(checkpoint->optimiser_state, apart.genes.size());
@@ -222,9 +222,9 @@ Status check_runnable(const Config& config) {
   return log ? Status() : Status(log.error());
 }
 
-Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
-                                        const std::vector<Genome>& stages, const Genome& best) {
-  std::vector<Validated> rows = {{"the config's own values", {}}};
+Result<std::vector<ScoreRow>> validate(Farm& farm, const Problem& apart,
+                                       const std::vector<Genome>& stages, const Genome& best) {
+  std::vector<ScoreRow> rows = {{"the config's own values", {}}};
   std::vector<Genome> genomes = {{}};
   for (std::size_t i = 0; i < stages.size(); ++i) {
     rows.push_back({"after stage " + std::to_string(i + 1), {}});
@@ -236,7 +236,7 @@ Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
   for (const Genome& genome : genomes) tasks.push_back(evaluation_task({0, 0, genome}, 0));
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(apart)), tasks));
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (results[i].outcome() == v1::OK) rows[i].fitness = results[i].evaluate().fitness();
+    if (results[i].outcome() == v1::OK) rows[i].score = results[i].evaluate().fitness();
   }
   return rows;
 }

@@ -84,10 +84,10 @@ void add_validation(const RunSummary& summary, const Problem& problem, std::stri
   if (summary.validated.empty()) return;
   text += fmt::format("validation on {} {} held out, {}:\n", summary.held_out,
                       problem.windows() ? "windows" : "trials", fitness_name(problem.fitness.kind));
-  for (const Validated& row : summary.validated) {
+  for (const ScoreRow& row : summary.validated) {
     text += fmt::format("  {:<24} {}\n", row.name,
-                        row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well");
-    json["validation"].push_back({{"name", row.name}, {"fitness", number_or_null(row.fitness)}});
+                        row.score ? fmt::format("{:.6g}", *row.score) : "does not end well");
+    json["validation"].push_back({{"name", row.name}, {"fitness", number_or_null(row.score)}});
   }
 }
 

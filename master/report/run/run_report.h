@@ -32,9 +32,8 @@ struct RunGeneration {
 
 // How well something predicts trials.
 struct ScoreRow {
-  std::string name;
-  std::optional<double> score;  // in the run's fitness, or nats a trial
-  std::optional<double> position_mm, heading_mrad;
+  std::string name;             // "the config's own values", "after stage 1", "the best"
+  std::optional<double> score;  // in the run's fitness, or nats a trial; none: it did not end well
 };
 
 // What is worked out once, when evolution ends, and kept in the run store.

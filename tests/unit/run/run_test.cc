@@ -247,7 +247,7 @@ TEST_F(RunTest, HoldsItsBestAgainstTrialsHeldOut) {
   const RunSummary summary = go(store, asked).value();
   EXPECT_EQ(summary.held_out, listener_.apart);
   std::vector<std::string> names;
-  for (const Validated& row : summary.validated) names.push_back(row.name);
+  for (const ScoreRow& row : summary.validated) names.push_back(row.name);
   EXPECT_THAT(names, ElementsAre("the config's own values", "the best"));
 }
 
