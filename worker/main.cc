@@ -34,26 +34,15 @@ at once.
 Exit status: 0 stopped as asked or the master's work is done, 2 wrong usage, 69 no master for the
 --wait-limit, 78 no master that would have this worker.)";
 
-struct Arguments {
-  std::string endpoint;
-  std::string name;
+struct Arguments : ServiceOptions {
   std::string keys = KeyFolder::default_path();
   bool insecure = false;
-  unsigned window = 0;
   unsigned processes = std::max(1u, std::thread::hardware_concurrency());
-  bool drain = false;
   double lifetime_s = 0;
-  double wait_limit_s = 0;
   ProcessLimits limits;
   bool allow_external = false;
-  bool local = false;
-  bool announce = false;
   int parent = 0;
-  std::string replaces;
   std::string replaced_end = "left";
-  std::uint64_t replaced_epoch = 0;
-  std::uint64_t replaced_attempt = 0;
-  std::string replaced_failure;
 };
 
 void describe(CLI::App& app, Arguments* arguments) {
@@ -63,14 +52,15 @@ void describe(CLI::App& app, Arguments* arguments) {
   app.add_option("--connect", arguments->endpoint, "The master: tcp://HOST:PORT or ipc://PATH")
       ->required()
       ->type_name("ENDPOINT");
-  app.add_option("--name", arguments->name, "Begin of the workers' names (default: the host's)");
+  app.add_option("--name", arguments->session.name,
+                 "Begin of the workers' names (default: the host's)");
   app.add_option("--keys", arguments->keys,
                  "Folder with worker.key and master.pub, which tcp:// needs (docs/security.md)")
       ->type_name("FOLDER")
       ->capture_default_str();
   app.add_flag("--insecure", arguments->insecure,
                "Talk to a master that has no keys: unencrypted, and to whoever answers");
-  app.add_option("--window", arguments->window,
+  app.add_option("--window", arguments->session.window,
                  "Jobs in hand, the one in work included (default: as the master likes)")
       ->check(CLI::Range(1, 1000));
   app.add_option("--processes", arguments->processes, "Worker processes")
@@ -103,13 +93,13 @@ void describe(CLI::App& app, Arguments* arguments) {
   app.add_flag("--local", arguments->local)->group("");
   app.add_flag("--announce", arguments->announce)->group("");
   app.add_option("--parent", arguments->parent)->group("");
-  app.add_option("--replaces", arguments->replaces)->group("");
+  app.add_option("--replaces", arguments->session.replaces)->group("");
   app.add_option("--replaced-end", arguments->replaced_end)
       ->check(CLI::IsMember({"left", "killed", "crashed", "hung"}))
       ->group("");
-  app.add_option("--replaced-epoch", arguments->replaced_epoch)->group("");
-  app.add_option("--replaced-attempt", arguments->replaced_attempt)->group("");
-  app.add_option("--replaced-failure", arguments->replaced_failure)->group("");
+  app.add_option("--replaced-epoch", arguments->session.replaced_epoch)->group("");
+  app.add_option("--replaced-attempt", arguments->session.replaced_attempt)->group("");
+  app.add_option("--replaced-failure", arguments->session.replaced_failure)->group("");
 }
 
 v1::ProcessEnd process_end(const std::string& word) {
@@ -141,27 +131,16 @@ int work(const Arguments& arguments) {
   StopSource stop;
   // Ctrl-C reaches the whole terminal's group; what it means is the parent's to decide.
   const StopOnSignals signals(&stop, /*ignore_interrupt=*/true);
-  ServiceOptions options;
-  options.endpoint = arguments.endpoint;
+  ServiceOptions options = arguments;
   options.security = std::move(*security);
-  options.local = arguments.local;
-  options.session.name = arguments.name;
   options.session.host = host_name();
   options.session.pid = getpid();
   options.session.fingerprint = build_info().fingerprint;
   options.session.numeric_class = numeric_class();
-  options.session.window = arguments.window;
-  options.session.replaces = arguments.replaces;
   options.session.replaced_end = process_end(arguments.replaced_end);
-  options.session.replaced_epoch = arguments.replaced_epoch;
-  options.session.replaced_attempt = arguments.replaced_attempt;
-  options.session.replaced_failure = arguments.replaced_failure;
   if (arguments.lifetime_s > 0) {
     options.session.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   }
-  options.drain = arguments.drain;
-  options.wait_limit_s = arguments.wait_limit_s;
-  options.announce = arguments.announce;
   const auto page = ProgressPage::inherit();
   if (!page) return complain(page.error(), 1);
   options.progress = &**page;
@@ -188,13 +167,13 @@ int start_workers(const Arguments& arguments) {
   const StopOnSignals signals(&stop);
   SupervisorOptions options;
   options.program = executable_path();
-  options.name = unique_worker_name(arguments.name);
+  options.name = unique_worker_name(arguments.session.name);
   options.processes = arguments.processes;
   options.arguments = {"--connect", arguments.endpoint, "--keys", arguments.keys};
   if (arguments.insecure) options.arguments.push_back("--insecure");
-  if (arguments.window > 0) {
+  if (arguments.session.window > 0) {
     options.arguments.insert(options.arguments.end(),
-                             {"--window", std::to_string(arguments.window)});
+                             {"--window", std::to_string(arguments.session.window)});
   }
   if (arguments.drain) options.arguments.push_back("--drain");
   if (arguments.allow_external) options.arguments.push_back("--allow-external");

@@ -64,9 +64,7 @@ Result<Comparison> read_comparison(const std::string& path) {
   std::string config;
   if (auto section = top.section("compare")) {
     section->read("config", config);
-    if (const auto seeds = section->count("seeds", 1, 10000)) {
-      comparison.seeds = static_cast<unsigned>(*seeds);
-    }
+    section->read("seeds", comparison.seeds, 1, 10000);
     section->read("evaluations", comparison.evaluations, 1);
     section->read("target_fitness", comparison.target_fitness, -kUnbounded, kUnbounded);
     section->finish();

@@ -2,7 +2,7 @@
 #include <set>
 
 #include "common/config/sections.h"
-#include "common/problem/external_problem.h"
+#include "common/problem/message_parts.h"
 
 namespace gapfarm {
 

@@ -6,7 +6,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/try.h"
-#include "common/config/residual_section.h"
 #include "common/config/sections.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
@@ -159,12 +158,6 @@ Status read_model_program(TomlSection& top, Model& model) {
 
 }  // namespace
 
-const ParameterTable& Model::table() const {
-  if (external) return external->table.table();
-  if (ground) return ground->table();
-  return tracked ? tracked->table() : *parameter_table(scenario).value();
-}
-
 Result<Model> nominal_model(std::string_view scenario) {
   auto table = parameter_table(scenario);
   if (!table.ok()) return table.error();
@@ -179,34 +172,17 @@ Result<Model> nominal_model(std::string_view scenario) {
 
 Model model_of_problem(const Problem& problem, ParameterValues values) {
   Model model;
-  model.scenario = problem.scenario;
+  static_cast<Simulated&>(model) = problem;
   model.version = build_info().version;
   model.fingerprint = build_info().fingerprint;
   model.values = std::move(values);
-  model.commands = problem.commands;
-  model.pieces = problem.pieces;
-  model.robot_file = problem.robot_file;
-  model.tracked = problem.tracked;
-  model.ground = problem.ground;
-  model.external = problem.external;
-  model.fitness = problem.fitness;
-  model.spread = problem.spread;
+  model.residual = {};
   return model;
 }
 
 Problem problem_of(const Model& model) {
   Problem problem;
-  problem.scenario = model.scenario;
-  problem.values = model.values;
-  problem.commands = model.commands;
-  problem.pieces = model.pieces;
-  problem.robot_file = model.robot_file;
-  problem.tracked = model.tracked;
-  problem.ground = model.ground;
-  problem.external = model.external;
-  problem.residual = model.residual;
-  problem.fitness = model.fitness;
-  problem.spread = model.spread;
+  static_cast<Simulated&>(problem) = model;
   return problem;
 }
 
@@ -241,12 +217,8 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   top.read("kind", model.kind);
   const ScenarioForm& form = scenario_form(scenario);
   if (form.robot || (form.other_robot && top.find("robot") != nullptr)) {
-    Problem problem = problem_of(model);
     const std::string robot = top.string("robot").value_or("");
-    RETURN_IF_ERROR(problem.set_robot(robot, path + ": robot"));
-    model.robot_file = problem.robot_file;
-    model.tracked = problem.tracked;
-    model.ground = problem.ground;
+    RETURN_IF_ERROR(model.set_robot(robot, path + ": robot"));
     model.values = model.table().nominal();  // effects that the file omits are neutral
   }
   if (form.program) {

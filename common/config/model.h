@@ -28,35 +28,18 @@ struct ModelOrigin {
   std::uint64_t evaluations = 0;
 };
 
-struct Model {
-  std::string scenario = "srv1";
+struct Model : Simulated {
   std::string kind = "evolved";  // "evolved", "diagnosed", "documented", ...
   std::string version;           // of the program
   std::string fingerprint;       // of the build
-  ParameterValues values;        // one a row of the scenario's table
   // Where a parameter lies with high probability, how high is the writer's to say: one a row, or
   // none at all.
   std::vector<std::optional<Interval>> intervals;
-  std::vector<CommandSpec> commands;  // the scenario's, in its order
-  std::vector<Piece> pieces;          // where the scenario has them
-  FitnessSettings fitness;
-  SpreadSettings spread;
   std::optional<double> score;  // fitness value on the data
   // World position that the effects' places count from, m: simulate a log less this.
   double frame_x_m = 0, frame_y_m = 0;
-  // Where the scenario's form takes one: what no cause explains, places from the same origin.
-  Residual residual;
   ModelData data;
   ModelOrigin origin;
-
-  // Where there is a robot: its file, and what it says.
-  std::string robot_file;
-  std::shared_ptr<const TrackedTable> tracked;
-  std::shared_ptr<const GroundTable> ground;
-  // Where a program of the user's simulates.
-  std::shared_ptr<const ExternalProgram> external;
-
-  const ParameterTable& table() const;  // REQUIRES: a known scenario
 };
 
 // A model with the scenario's nominal values and commands, of this build.  Errors: unknown

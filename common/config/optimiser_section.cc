@@ -50,24 +50,16 @@ void read_optimiser(TomlSection& top, OptimiserSettings& to) {
   to.kind = default_kind(top.table()).kind;
   auto section = top.section("optimiser");
   if (!section) return;
-  if (const auto kind = section->choice("kind", optimiser_names())) {
-    to.kind = static_cast<OptimiserKind>(*kind);
-  }
-  if (const auto population = section->count("population", 4, 1000000)) {
-    to.population = static_cast<unsigned>(*population);
-  }
+  section->read("kind", to.kind, optimiser_names());
+  section->read("population", to.population, 4, 1000000);
   section->read("differential_weight", to.differential_weight, 0.01, 2);
   section->read("crossover_rate", to.crossover_rate, 0, 1);
   section->read("sigma", to.sigma, 1e-4, 1);
   section->read("iterations", to.iterations, 1, 1000000);
-  if (const auto local = section->choice("local", kLocalNames)) {
-    to.local = static_cast<LocalSearchKind>(*local);
-  }
+  section->read("local", to.local, kLocalNames);
   section->read("step", to.step, 1e-6, 0.5);
   section->read("local_evaluations", to.local_evaluations, 0, 1000000);
-  if (const auto restarts = section->choice("restarts", kRestartNames)) {
-    to.restarts = static_cast<RestartKind>(*restarts);
-  }
+  section->read("restarts", to.restarts, kRestartNames);
   section->finish();
 }
 

@@ -39,9 +39,7 @@ void read_fitness(TomlSection& top, FitnessSettings& fitness) {
 }
 
 void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
-  if (const auto kind = section.choice("kind", fitness_names())) {
-    fitness.kind = static_cast<FitnessKind>(*kind);
-  }
+  section.read("kind", fitness.kind, fitness_names());
   section.read("outlier_share", fitness.outlier_share, 0, kMostOutliers);
   section.read("roll_penalty", fitness.roll_penalty, 0, kUnbounded, "per rad");
   section.read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded, "per rad");
@@ -64,9 +62,7 @@ void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
 void read_spread(TomlSection& top, SpreadSettings& spread) {
   auto section = top.section("spread");
   if (!section) return;
-  if (const auto kind = section->choice("kind", spread_names())) {
-    spread.kind = static_cast<SpreadKind>(*kind);
-  }
+  section->read("kind", spread.kind, spread_names());
   section->read("replicates", spread.replicates, 2, 100000);
   if (spread.kind == SpreadKind::kCubature && section->table().contains("replicates")) {
     section->fail("replicates",

@@ -1,9 +1,9 @@
-#include "common/config/residual_section.h"
-
 #include <cmath>
 #include <optional>
 
 #include "common/base/try.h"
+#include "common/config/sections.h"
+#include "common/problem/run_files.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -60,8 +60,7 @@ void read_weights(TomlSection& section, const Model& model, ResidualTerm* term) 
 
 ResidualTerm read_term(TomlSection& section, const Model& model) {
   ResidualTerm term;
-  term.frame =
-      static_cast<ResidualFrame>(section.choice("frame", residual_frame_names()).value_or(0));
+  section.read("frame", term.frame, residual_frame_names());
   section.read("by_drive", term.by_drive);
   const std::vector<std::string> names = covariate_names();
   term.covariates = section.choices("covariates", names).value_or(std::vector<std::size_t>());
@@ -80,7 +79,7 @@ void read_outliers(TomlSection& section, Model& model) {
   auto read = section.section("strays");
   if (!read) return;
   OutlierDrives outliers;
-  outliers.kind = static_cast<OutlierKind>(read->choice("kind", outlier_kind_names()).value_or(0));
+  read->read("kind", outliers.kind, outlier_kind_names());
   for (const auto& [key, value] : outlier_values(outliers)) {
     *value = read->number(key, -1e3, 1e3).value_or(*value);
   }
@@ -136,9 +135,7 @@ Status check_residual_of(const Model& model) {
     return Error{"scenario " + model.scenario +
                  " takes no [residual]; leave the section out of this model"};
   }
-  std::vector<std::string> commands;
-  for (const CommandSpec& c : model.commands) commands.push_back(c.name);
-  RETURN_IF_ERROR(check_residual(model.residual.field, commands));
+  RETURN_IF_ERROR(check_residual(model.residual.field, command_names(model.commands)));
   return model.residual.outliers ? check_outliers(*model.residual.outliers) : Status();
 }
 

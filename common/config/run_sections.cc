@@ -1,6 +1,7 @@
 // [evolution], [farm] and [simulate]: how a run goes.
 
 #include "common/config/sections.h"
+#include "common/problem/run_files.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -63,8 +64,7 @@ void check_evolution(TomlSection& section, const EvolutionSettings& evolution) {
 
 void check_commands(TomlSection& section, const std::vector<CommandSpec>& commands,
                     SimulateSettings& simulate) {
-  std::vector<std::string> names;
-  for (const CommandSpec& command : commands) names.push_back(command.name);
+  const std::vector<std::string> names = command_names(commands);
   const auto found = section.choices("commands", names);
   if (!found) return;
   simulate.commands.clear();
@@ -113,16 +113,12 @@ void read_evolution(TomlSection& top, EvolutionSettings& to) {
   if (!section) return;
   section->read("population", to.population, 2, kMany);
   section->read("elitism", to.elitism, 0, kMany);
-  if (const auto kind = section->choice("selection", kSelectionNames)) {
-    to.selection = static_cast<SelectionKind>(*kind);
-  }
+  section->read("selection", to.selection, kSelectionNames);
   section->read("tournament_size", to.tournament_size, 1, kMany);
   section->read("rank_pressure", to.rank_pressure, 1.01, 2);
   read_kinds(*section, "crossovers", kCrossoverNames, to.crossovers);
   read_kinds(*section, "mutations", kMutationNames, to.mutations);
-  if (const auto order = section->choice("order", kOrderNames)) {
-    to.order = static_cast<VariationOrder>(*order);
-  }
+  section->read("order", to.order, kOrderNames);
   section->read("crossover_probability", to.crossover_probability, 0, 1);
   section->read("mutation_probability", to.mutation_probability, 0, 1);
   section->read("gene_mutation_share", to.gene_mutation_share, 0, 1);
@@ -143,9 +139,7 @@ void read_evolution(TomlSection& top, EvolutionSettings& to) {
 void read_farm(TomlSection& top, FarmSettings& to) {
   auto section = top.section("farm");
   if (!section) return;
-  if (const auto workers = section->count("workers", 0, 1024)) {
-    to.workers = static_cast<unsigned>(*workers);
-  }
+  section->read("workers", to.workers, 0, 1024);
   if (auto listen = section->string("listen")) {
     if (!is_endpoint(*listen)) {
       section->fail("listen", "listen is " + quoted_word(*listen) +
@@ -179,7 +173,7 @@ void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
   auto section = top.section("simulate");
   if (!section) return;
   static const std::string plans[] = {"grid", "free"};
-  if (const auto plan = section->choice("plan", plans)) to.plan = static_cast<PlanKind>(*plan);
+  section->read("plan", to.plan, plans);
   section->read("sessions", to.sessions, 1, kMany);
   section->read("trials_per_session", to.trials_per_session, 1, kMany);
   section->read("chain", to.chain, 1, kMany);

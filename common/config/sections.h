@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/config/config.h"
+#include "common/config/model.h"
 #include "common/config/settings.h"
 #include "common/config/toml_section.h"
 
@@ -31,6 +32,11 @@ void read_optimiser(TomlSection& top, OptimiserSettings& optimiser);
 void read_farm(TomlSection& top, FarmSettings& farm);
 void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
                    SimulateSettings& simulate);
+
+// [residual] of a model, and its text; empty where there is none.
+void read_residual(TomlSection& top, Model& model);
+std::string residual_section(const Model& model);
+Status check_residual_of(const Model& model);
 
 // The value of a row as TOML writes it: a number, a boolean or a choice's word.  None when it is
 // not one that the row accepts; the error is reported.

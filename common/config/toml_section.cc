@@ -244,11 +244,6 @@ void TomlSection::read(std::string_view key, std::uint64_t& to, std::uint64_t lo
   to = count(key, lower, std::numeric_limits<std::uint64_t>::max()).value_or(to);
 }
 
-void TomlSection::read(std::string_view key, std::optional<std::uint64_t>& to,
-                       std::uint64_t lower) {
-  if (const auto value = count(key, lower, std::numeric_limits<std::uint64_t>::max())) to = value;
-}
-
 void TomlSection::read(std::string_view key, bool& to) { to = boolean(key).value_or(to); }
 
 void TomlSection::read(std::string_view key, std::string& to) {

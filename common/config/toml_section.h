@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "common/base/result.h"
@@ -87,7 +88,18 @@ class TomlSection {
             std::string_view unit = "");
   void read(std::string_view key, unsigned& to, unsigned lower, unsigned upper);
   void read(std::string_view key, std::uint64_t& to, std::uint64_t lower);
-  void read(std::string_view key, std::optional<std::uint64_t>& to, std::uint64_t lower);
+  template <class Count>
+  requires std::is_integral_v<Count>
+  void read(std::string_view key, std::optional<Count>& to, std::type_identity_t<Count> lower,
+            std::type_identity_t<Count> upper = std::numeric_limits<Count>::max()) {
+    if (const auto value = count(key, lower, upper)) to = static_cast<Count>(*value);
+  }
+  // One of `names`, in the order of the enumeration.
+  template <class Kind>
+  requires std::is_enum_v<Kind>
+  void read(std::string_view key, Kind& to, std::span<const std::string> names) {
+    if (const auto index = choice(key, names)) to = static_cast<Kind>(*index);
+  }
   void read(std::string_view key, bool& to);
   void read(std::string_view key, std::string& to);
 

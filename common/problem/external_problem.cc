@@ -1,4 +1,4 @@
-#include "common/problem/external_problem.h"
+#include "common/problem/message_parts.h"
 
 namespace gapfarm {
 

@@ -1,8 +1,7 @@
-#include "common/problem/fitness_problem.h"
-
 #include <cmath>
 
 #include "common/base/try.h"
+#include "common/problem/message_parts.h"
 
 namespace gapfarm {
 namespace {

@@ -79,13 +79,13 @@ const char* fitness_unit(FitnessKind kind) {
   return "?";
 }
 
-const ParameterTable& Problem::table() const {
+const ParameterTable& Simulated::table() const {
   if (external) return external->table.table();
   if (ground) return ground->table();
   return tracked ? tracked->table() : *parameter_table(scenario).value();
 }
 
-Status Problem::set_robot(const std::string& text, const std::string& path) {
+Status Simulated::set_robot(const std::string& text, const std::string& path) {
   if (text.find_first_not_of(" \t\r\n\xEF\xBB\xBF") == text.find('<')) {
     return Error{path + ": found XML, expected a robot file; make one of a URDF: gapfarm robot " +
                  path + " --out robot.toml"};

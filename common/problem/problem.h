@@ -86,21 +86,18 @@ struct SpreadSettings {
 // Least time between the samples of a simulated path, s: a finer one would only fill the memory.
 inline constexpr double kLeastPathInterval_s = 1e-4;
 
-struct Problem {
+// What is simulated, and how it is scored: what a problem and a model have in common.
+struct Simulated {
   std::string scenario = "srv1";
-  ParameterValues values;  // one a row of the table
-  std::vector<Gene> genes;
-  std::vector<CommandSpec> commands;
+  ParameterValues values;             // one a row of the table
+  std::vector<CommandSpec> commands;  // the scenario's, in its order
   std::vector<Piece> pieces;  // of a scenario whose form has them: one a command, in its order
   FitnessSettings fitness;
   SpreadSettings spread;
-  TrialLog log;
   // Where there is one: the robot's file, and what it says to scenario `srv1` or `ground`.
   std::string robot_file;
   std::shared_ptr<const TrackedTable> tracked;
   std::shared_ptr<const GroundTable> ground;
-  // Where the scenario's form has windows: the runs of which `log` is windows.
-  std::vector<CommandedRun> runs;
   // Where the scenario's form has one: the program that answers.
   std::shared_ptr<const ExternalProgram> external;
   // Where the scenario's form has drives alone: a correction of where they end.
@@ -109,11 +106,19 @@ struct Problem {
   // Of the robot or the program where there is one, else of the scenario.  REQUIRES: a known
   // scenario.
   const ParameterTable& table() const;
-  // What treads are simulated: of the robot where there is one, else the SRV-1's.
-  const TrackedTable& treads() const { return tracked ? *tracked : srv1_robot(); }
   // Takes the robot; `values` become its own.  Errors: parse_robot()'s, a robot that the scenario
   // cannot simulate; `path` names the file.
   Status set_robot(const std::string& text, const std::string& path);
+};
+
+struct Problem : Simulated {
+  std::vector<Gene> genes;
+  TrialLog log;
+  // Where the scenario's form has windows: the runs of which `log` is windows.
+  std::vector<CommandedRun> runs;
+
+  // What treads are simulated: of the robot where there is one, else the SRV-1's.
+  const TrackedTable& treads() const { return tracked ? *tracked : srv1_robot(); }
   // The problem's values with the genes of `genome` put in; an empty genome changes nothing.
   ParameterValues values_of(const Genome& genome) const;
   // Of the commands of its runs.  REQUIRES: the scenario's form has windows.

@@ -1,6 +1,6 @@
-#include "common/problem/residual_problem.h"
-
 #include "common/base/try.h"
+#include "common/problem/message_parts.h"
+#include "common/problem/run_files.h"
 
 namespace gapfarm {
 namespace {
@@ -98,12 +98,8 @@ Status read_residual(const v1::Problem& message, Problem* problem) {
     problem->residual.field.push_back(std::move(term));
   }
   RETURN_IF_ERROR(read_outliers(message, problem));
-  std::vector<std::string> commands;
-  for (const CommandSpec& c : problem->commands) commands.push_back(c.name);
-  if (Status s = check_residual(problem->residual.field, commands); !s) {
-    return Error{"problem: " + s.error().message};
-  }
-  return {};
+  const Status sound = check_residual(problem->residual.field, command_names(problem->commands));
+  return sound ? Status() : Error{"problem: " + sound.error().message};
 }
 
 }  // namespace gapfarm

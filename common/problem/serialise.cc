@@ -9,9 +9,9 @@
 
 #include "common/base/hash.h"
 #include "common/base/suggest.h"
-#include "common/problem/external_problem.h"
-#include "common/problem/fitness_problem.h"
-#include "common/problem/residual_problem.h"
+#include "common/base/try.h"
+#include "common/problem/message_parts.h"
+#include "common/problem/run_files.h"
 #include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
@@ -174,8 +174,7 @@ Status read_commands(const v1::Problem& message, Problem* problem) {
 }
 
 Status read_trials(const v1::Problem& message, Problem* problem) {
-  std::vector<std::string> names;
-  for (const CommandSpec& c : problem->commands) names.push_back(c.name);
+  const std::vector<std::string> names = command_names(problem->commands);
   for (const v1::Trial& t : message.trials()) {
     Trial trial = from_proto(t);
     const std::string where = "trial " + trial.session + "/" + std::to_string(trial.trial);
@@ -338,12 +337,12 @@ Result<Problem> from_proto(const v1::Problem& message) {
   Problem problem;
   problem.scenario = message.scenario();
   if (auto table = parameter_table(problem.scenario); !table) return table.error();
-  if (Status s = read_robot(message, &problem); !s) return s.error();
-  if (Status s = read_external(message, &problem); !s) return s.error();
-  if (Status s = read_runs(message, &problem); !s) return s.error();
-  if (Status s = read_values(message, &problem); !s) return s.error();
-  if (Status s = read_commands(message, &problem); !s) return s.error();
-  if (Status s = read_pieces(message, &problem); !s) return s.error();
+  RETURN_IF_ERROR(read_robot(message, &problem));
+  RETURN_IF_ERROR(read_external(message, &problem));
+  RETURN_IF_ERROR(read_runs(message, &problem));
+  RETURN_IF_ERROR(read_values(message, &problem));
+  RETURN_IF_ERROR(read_commands(message, &problem));
+  RETURN_IF_ERROR(read_pieces(message, &problem));
   if (!v1::Fitness::Kind_IsValid(message.fitness().kind()) ||
       !v1::Spread::Kind_IsValid(message.spread().kind())) {
     return invalid("unknown kind of fitness or spread; master and worker must be the same build");
@@ -355,9 +354,9 @@ Result<Problem> from_proto(const v1::Problem& message) {
   }
   problem.spread = {static_cast<SpreadKind>(message.spread().kind()),
                     message.spread().replicates()};
-  if (Status s = check_score(problem.fitness, problem.spread); !s) return s.error();
-  if (Status s = read_trials(message, &problem); !s) return s.error();
-  if (Status s = read_residual(message, &problem); !s) return s.error();
+  RETURN_IF_ERROR(check_score(problem.fitness, problem.spread));
+  RETURN_IF_ERROR(read_trials(message, &problem));
+  RETURN_IF_ERROR(read_residual(message, &problem));
   return problem;
 }
 

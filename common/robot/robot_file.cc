@@ -99,12 +99,8 @@ void marker_rows(Visitor& v, Pose& X_RM) {
 }
 
 void read_wheel(TomlSection& own, RobotWheel& wheel) {
-  if (const auto kind = own.choice("kind", wheel_names())) {
-    wheel.kind = static_cast<WheelKind>(*kind);
-  }
-  if (const auto side = own.choice("side", side_names())) {
-    wheel.side = static_cast<WheelSide>(*side);
-  }
+  own.read("kind", wheel.kind, wheel_names());
+  own.read("side", wheel.side, side_names());
   wheel_rows(own, wheel);
   own.read("roller_angle", wheel.roller_angle_rad, -7, 7, "rad");
   own.read("group", wheel.group);
@@ -185,9 +181,7 @@ void read_commands(TomlSection& top, GroundRobot& robot) {
                   : has("throttle") ? CommandKind::kThrottleSteering
                   : has("steering") ? CommandKind::kSpeedSteering
                                     : CommandKind::kWheelSpeeds;
-  if (const auto kind = top.choice("command_kind", command_kind_names())) {
-    robot.command = static_cast<CommandKind>(*kind);
-  }
+  top.read("command_kind", robot.command, command_kind_names());
   top.read("measured", robot.measured);
 }
 

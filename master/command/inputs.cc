@@ -164,17 +164,16 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   base.job_limits = {settings.failure_limit, settings.kill_limit};
   base.copies.audit_share = settings.audit_share;
   base.copies.straggler_factor = settings.straggler_factor;
-  base.allow_mixed_numeric_classes = settings.allow_mixed_numeric_classes;
+  base.admittance.allow_mixed_numeric_classes = settings.allow_mixed_numeric_classes;
   base.stop = &context.stop;
   if (!base.on_event) report_to(context.console, base);
   return SocketFarm::create(std::move(base));
 }
 
-Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettings& settings,
-                                    CliContext& context) {
+Result<std::unique_ptr<Farm>> start_recorded(const FarmOptions& options,
+                                             const FarmSettings& settings, CliContext& context) {
   ASSIGN_OR_RETURN(auto farm, start_farm(options, settings, context));
-  auto recorded = context.work->over(*farm);
-  return RecordedWork{std::move(farm), std::move(recorded)};
+  return context.work->over(std::move(farm));
 }
 
 Result<int> print_dry_run(const std::string& would, Json facts, const FarmOptions& options,

@@ -110,16 +110,9 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
 Result<int> print_dry_run(const std::string& would, Json facts, const FarmOptions& options,
                           const FarmSettings& settings, CliContext& context);
 
-// A farm that is asked through the command's LongCommand.
-struct RecordedWork {
-  std::unique_ptr<SocketFarm> sockets;
-  std::unique_ptr<Farm> farm;
-
-  Farm& operator*() const { return *farm; }
-  Farm* operator->() const { return farm.get(); }
-};
-Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettings& settings,
-                                    CliContext& context);
+// The same, asked through the command's LongCommand.
+Result<std::unique_ptr<Farm>> start_recorded(const FarmOptions& options,
+                                             const FarmSettings& settings, CliContext& context);
 
 // What a command exits with that ends with this error, which is shown: kExitBadUsage before its
 // work begins.  After a signal kExitResumable, with a sentence how to go on, where the command

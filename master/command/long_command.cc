@@ -47,15 +47,15 @@ std::string state_folder() {
   return {};
 }
 
-std::string state_of(int exit_code) {
+bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
+
+}  // namespace
+
+std::string state_of_exit(int exit_code) {
   if (exit_code == kExitDone || exit_code == kExitQuarantined) return "finished";
   if (exit_code == kExitResumable || exit_code > kExitSignalBase) return "stopped";
   return "failed";
 }
-
-bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
-
-}  // namespace
 
 std::string command_line() {
   std::string text = "gapfarm";
@@ -84,16 +84,16 @@ Result<KeepingPlace> KeepOption::place(const std::string& command, const std::st
   return KeepingPlace{fs::path(state) / name, true};
 }
 
-// The farm that a command asks: it remembers, and every batch is shown.
+// The farm that a command asks: it remembers where the command keeps, and every batch is shown.
 class LongCommand::Asked : public RecordedFarm {
  public:
-  Asked(SocketFarm& farm, LongCommand& work)
-      : RecordedFarm(farm, *work.answers_, &farm), work_(work), wait_(farm.endpoints()) {
+  Asked(std::shared_ptr<Farm> farm, LongCommand& work)
+      : RecordedFarm(farm, work.answers_.get()), work_(work), wait_(farm->endpoints()) {
     set_stage(work.stage_);
-    work.farm_here(farm);
-    watch([this, &farm](const RecordedProgress& progress) {
+    work.farm_here(*farm);
+    watch([this](const RecordedProgress& progress) {
       set_stage(work_.stage_);
-      work_.on_progress(progress, farm, wait_);
+      work_.on_progress(progress, *this, wait_);
     });
   }
   ~Asked() override { work_.farm_gone(); }
@@ -149,78 +149,8 @@ LongCommand::LongCommand(std::string command, std::vector<ProgressStage> stages,
 
 LongCommand::~LongCommand() = default;
 
-namespace {
-
-// Where nothing is kept, the farm as it is, with its progress shown.
-class Watched : public Farm {
- public:
-  Watched(Farm& farm, std::function<void(const RecordedProgress&)> watcher)
-      : farm_(farm), watcher_(std::move(watcher)) {}
-
-  std::string add_problem(const v1::Problem& problem) override {
-    return farm_.add_problem(problem);
-  }
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress) override {
-    const std::uint64_t before = asked_;
-    asked_ += tasks.size();
-    watcher_({0, before, asked_});
-    auto results = farm_.run(problem_hash, tasks, [&](const FarmProgress& progress) {
-      watcher_({0, before + progress.done, asked_});
-      if (on_progress) on_progress(progress);
-    });
-    if (results) watcher_({0, asked_, asked_});
-    return results;
-  }
-  std::vector<WorkerStatus> workers() const override { return farm_.workers(); }
-  std::uint64_t retries() const override { return farm_.retries(); }
-
- private:
-  Farm& farm_;
-  std::function<void(const RecordedProgress&)> watcher_;
-  std::uint64_t asked_ = 0;
-};
-
-}  // namespace
-
-std::unique_ptr<Farm> LongCommand::over(SocketFarm& farm) {
-  if (keeps()) return std::make_unique<Asked>(farm, *this);
-  const auto wait = std::make_shared<WorkerWait>(farm.endpoints());
-  farm_gone();
-  return std::make_unique<Watched>(farm, [this, &farm, wait](const RecordedProgress& progress) {
-    on_progress(progress, farm, *wait);
-  });
-}
-
-namespace {
-
-// A farm and what is asked in its place, one after the other.
-class Owned : public Farm {
- public:
-  Owned(std::unique_ptr<SocketFarm> farm, LongCommand& work)
-      : farm_(std::move(farm)), asked_(work.over(*farm_)) {}
-
-  std::string add_problem(const v1::Problem& problem) override {
-    return asked_->add_problem(problem);
-  }
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress) override {
-    return asked_->run(problem_hash, tasks, on_progress);
-  }
-  std::vector<WorkerStatus> workers() const override { return farm_->workers(); }
-  std::uint64_t retries() const override { return farm_->retries(); }
-
- private:
-  std::unique_ptr<SocketFarm> farm_;
-  std::unique_ptr<Farm> asked_;
-};
-
-}  // namespace
-
-std::unique_ptr<Farm> LongCommand::over(std::unique_ptr<SocketFarm> farm) {
-  return std::make_unique<Owned>(std::move(farm), *this);
+std::unique_ptr<Farm> LongCommand::over(std::shared_ptr<Farm> farm) {
+  return std::make_unique<Asked>(std::move(farm), *this);
 }
 
 void LongCommand::plan_stages() {
@@ -273,7 +203,7 @@ void LongCommand::advance(std::uint64_t done, std::uint64_t total) {
   show();
 }
 
-void LongCommand::on_progress(const RecordedProgress& progress, const SocketFarm& farm,
+void LongCommand::on_progress(const RecordedProgress& progress, const Farm& farm,
                               WorkerWait& wait) {
   now_ = {before_.remembered + progress.remembered, before_.simulated + progress.simulated,
           before_.asked + progress.asked};
@@ -290,7 +220,7 @@ void LongCommand::on_progress(const RecordedProgress& progress, const SocketFarm
   show(news);
 }
 
-void LongCommand::farm_here(const SocketFarm& farm) {
+void LongCommand::farm_here(const Farm& farm) {
   for (const std::string& endpoint : farm.endpoints()) {
     if (record_.listen.empty() && endpoint.rfind("tcp://", 0) == 0) record_.listen = endpoint;
   }
@@ -314,23 +244,11 @@ void LongCommand::show(bool news) {
 void LongCommand::write_record() {
   if (!keeps()) return;
   written_s_ = steady_now_s();
-  const ProgressView view = progress_.at(written_s_);
-  record_.stage = view.stage;
-  record_.stage_number = view.number;
-  record_.stages = view.stages;
-  record_.done = view.done;
-  record_.total = view.total;
-  record_.share = record_.state == "finished" ? 1 : view.share;
-  record_.rate_per_s = view.rate_per_s;
-  record_.time_left_s = view.time_left_s;
-  record_.remembered = view.remembered;
-  record_.simulated = view.simulated;
+  static_cast<ProgressView&>(record_) = progress_.at(written_s_);
+  if (record_.state == "finished") record_.share = 1;
   record_.waiting = waiting_;
   record_.fleets = fleets_;
-  record_.workers.clear();
-  for (const WorkerStatus& w : workers_) {
-    record_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});
-  }
+  record_.workers = workers_;
   record_.heartbeat_unix_s = unix_now_s();
   // A courtesy: the command goes on when it cannot be written.
   const auto text = json_text(to_json(record_));
@@ -356,7 +274,7 @@ void LongCommand::end(int exit_code) {
                               now_.remembered + now_.simulated,
                               answer_file(place_.folder).string()));
   }
-  record_.state = state_of(exit_code);
+  record_.state = state_of_exit(exit_code);
   record_.reason = record_.state == "stopped" ? "stopped by request"
                    : record_.state == "failed"
                        ? "failed with exit code " + std::to_string(exit_code)

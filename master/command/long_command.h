@@ -11,7 +11,7 @@
 #include "common/base/result.h"
 #include "common/progress/overall_progress.h"
 #include "master/command/console.h"
-#include "master/farm/socket_farm.h"
+#include "master/farm/farm.h"
 #include "master/store/answer_store.h"
 #include "master/store/command_record.h"
 #include "master/store/run_lock.h"
@@ -22,6 +22,9 @@ struct CliContext;
 
 // What this process was called with: "gapfarm diagnose ...".
 std::string command_line();
+
+// What a command that ended so is, for status and --on-end: "finished", "stopped" or "failed".
+std::string state_of_exit(int exit_code);
 
 struct KeepingPlace {
   std::filesystem::path folder;
@@ -55,9 +58,8 @@ class LongCommand {
   ~LongCommand();
   LongCommand& operator=(LongCommand&&) = delete;
 
-  // The farm to ask from now on, for as long as it lives; `farm` and this outlive it.
-  std::unique_ptr<Farm> over(SocketFarm& farm);
-  std::unique_ptr<Farm> over(std::unique_ptr<SocketFarm> farm);
+  // The farm to ask from now on, for as long as it lives; this outlives it.
+  std::unique_ptr<Farm> over(std::shared_ptr<Farm> farm);
 
   // Stage `k` (from 0), or the one of this name, begins.  `tasks`: how many it will ask, if known.
   void stage(std::size_t k, std::uint64_t tasks = 0);
@@ -82,8 +84,8 @@ class LongCommand {
   class Asked;
   void entered();
   void plan_stages();
-  void on_progress(const RecordedProgress& progress, const SocketFarm& farm, WorkerWait& wait);
-  void farm_here(const SocketFarm& farm);
+  void on_progress(const RecordedProgress& progress, const Farm& farm, WorkerWait& wait);
+  void farm_here(const Farm& farm);
   void farm_gone();
   void show(bool news = false);
   void write_record();

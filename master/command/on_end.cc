@@ -28,11 +28,6 @@ std::string out_of(const CLI::App& command) {
   return code ? out : whole.string();
 }
 
-const char* state_word(int exit_code) {
-  if (exit_code == kExitDone || exit_code == kExitQuarantined) return "finished";
-  return exit_code == kExitResumable || exit_code > kExitSignalBase ? "stopped" : "failed";
-}
-
 // Its exit status, or what kept it from starting.
 Result<int> run_shell(const std::string& text, const std::vector<std::string>& variables) {
   ChildSetup setup;
@@ -72,7 +67,7 @@ void conclude_command(const CLI::App& command, int exit_code, CliContext& contex
   if (text.empty() || context.dry_run) return;
   const auto status =
       run_shell(text, {"GAPFARM_COMMAND=" + command.get_name(), "GAPFARM_OUT=" + out_of(command),
-                       std::string("GAPFARM_STATE=") + state_word(exit_code),
+                       "GAPFARM_STATE=" + state_of_exit(exit_code),
                        "GAPFARM_EXIT=" + std::to_string(exit_code)});
   if (!status) {
     context.console.error(Error{"--on-end: " + status.error().message});

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <iterator>
 #include <string>
@@ -19,7 +20,7 @@ struct WorkerStatus {
   std::string name;
   std::string host;
   std::string state;  // "idle", "busy", "leaving", "gone"
-  unsigned jobs = 0;
+  unsigned jobs = 0;  // in its hands
   std::uint64_t finished = 0;
   double rate_per_s = 0;  // jobs, since it joined
 };
@@ -28,6 +29,45 @@ struct FarmProgress {
   std::size_t done = 0;
   std::size_t total = 0;
 };
+
+// What a farm went through.  Of a run: counted over all masters that have written to it.
+struct FarmTally {
+  std::uint64_t retries = 0, copies = 0, compared = 0, alarms = 0, hung = 0, handed_over = 0;
+  std::uint64_t late = 0, foreign = 0, malformed = 0;
+  std::uint64_t links = 0, refused_keys = 0, failed_handshakes = 0, dropped_links = 0;
+
+  struct Row {
+    const char* key;  // in the store and in status
+    std::uint64_t FarmTally::*count;
+    const char* label;  // for people
+  };
+  static const std::array<Row, 13> kRows;
+
+  FarmTally& operator+=(const FarmTally& other) {
+    for (const Row& row : kRows) this->*row.count += other.*row.count;
+    return *this;
+  }
+};
+
+inline constexpr std::array<FarmTally::Row, 13> FarmTally::kRows = {{
+    {"retries", &FarmTally::retries, "retries: jobs given out again"},
+    {"copies", &FarmTally::copies, "copies: jobs given to a second worker, the first took long"},
+    {"compared", &FarmTally::compared, "audits and copies: answers held against another worker's"},
+    {"alarms", &FarmTally::alarms, "alarms: those of them that differed"},
+    {"hung", &FarmTally::hung, "workers killed because their simulation stood still"},
+    {"handed_over", &FarmTally::handed_over,
+     "answers that workers kept from one master to the next"},
+    {"late", &FarmTally::late, "late: answers to jobs that had one"},
+    {"foreign", &FarmTally::foreign, "foreign: answers to nothing that was asked"},
+    {"malformed", &FarmTally::malformed, "malformed: messages that made no sense"},
+    {"links", &FarmTally::links, "TCP connections"},
+    {"refused_keys", &FarmTally::refused_keys, "of them refused: keys that are not listed"},
+    {"failed_handshakes", &FarmTally::failed_handshakes, "of them failed: handshakes"},
+    {"dropped_links", &FarmTally::dropped_links, "of them closed by the limits"},
+}};
+
+// Reported an answer by its place in the batch.
+using AnswerWatcher = std::function<void(std::size_t task, const v1::TaskResult& result)>;
 
 class Farm {
  public:
@@ -61,11 +101,18 @@ class Farm {
     return {};
   }
 
-  virtual std::vector<WorkerStatus> workers() const = 0;
+  // From now on every answer is shown to `watcher`, before the run() that asked returns or fails.
+  // Empty: nobody.
+  virtual void watch_answers(AnswerWatcher /*watcher*/) {}
+  virtual std::vector<WorkerStatus> workers() const { return {}; }
   // Those whose workers stand on clusters for it.
   virtual std::vector<FleetStatus> fleets() const { return {}; }
-  // Jobs given out a second time because their worker went.
-  virtual std::uint64_t retries() const = 0;
+  // For workers, as bound: ports are filled in.
+  virtual std::vector<std::string> endpoints() const { return {}; }
+  virtual FarmTally tally() const { return {}; }
+  virtual std::uint64_t given_up() const { return 0; }  // tasks
+  // Of the run; empty before the first worker.
+  virtual std::string numeric_class() const { return {}; }
 };
 
 // What run() returns when a stop was requested; its code is kStopped.

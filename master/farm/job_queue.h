@@ -12,7 +12,7 @@
 
 #include "common/process/process_pool.h"
 #include "gapfarm/v1/farm.pb.h"
-#include "master/farm/answer_watch.h"
+#include "master/farm/farm.h"
 #include "master/farm/second_opinions.h"
 
 namespace gapfarm {

@@ -55,7 +55,7 @@ void note_pace(WorkerRecord& worker, std::uint64_t attempt, double wall, double 
 Scheduler::Scheduler(SchedulerOptions options)
     : options_(std::move(options)),
       registry_(options_.admittance),
-      queue_(options_.limits, options_.copies) {}
+      queue_(options_.job_limits, options_.copies) {}
 
 void Scheduler::report(FarmEvent::Kind kind, const std::string& worker,
                        const std::string& text) const {
@@ -118,13 +118,13 @@ void Scheduler::cancel(const Losers& losers) {
 }
 
 void Scheduler::on_malformed(const std::string& peer) {
-  ++counts_.malformed;
+  ++tally_.malformed;
   const WorkerRecord* worker = registry_.find_peer(peer);
   if (worker != nullptr) report(FarmEvent::kBadMessage, worker->name, "sent a malformed message");
 }
 
 void Scheduler::on_other_protocol(const std::string& peer, std::uint32_t protocol) {
-  ++counts_.malformed;
+  ++tally_.malformed;
   const std::string reason = "the worker speaks protocol " + std::to_string(protocol) +
                              " and the master " + std::to_string(kProtocol) +
                              "; use the same build on both sides";
@@ -188,12 +188,15 @@ void Scheduler::on_hello(const std::string& peer, const v1::Hello& hello, double
   }
   WorkerRecord& worker = *admission.worker;
   if (!hello.replaces().empty() && hello.replaces() != worker.name) {
-    on_process_end(
-        {hello.replaces(), cause_of(hello.replaced_end()), hello.replaced_epoch(),
-         hello.replaced_attempt(),
-         "its process ended and was replaced by " + worker.name +
-             (hello.replaced_failure().empty() ? "" : ": " + first_line(hello.replaced_failure())),
-         hello.replaced_failure()});
+    ProcessEnded end;
+    end.name = hello.replaces();
+    end.cause = cause_of(hello.replaced_end());
+    end.epoch = hello.replaced_epoch();
+    end.attempt = hello.replaced_attempt();
+    end.failure = hello.replaced_failure();
+    end.text = "its process ended and was replaced by " + worker.name +
+               (end.failure.empty() ? "" : ": " + first_line(end.failure));
+    on_process_end(end);
   }
   if (admission.returning) {
     // Whatever else was under way to it, or its answers on the way here, may be lost.
@@ -226,7 +229,7 @@ void Scheduler::keep_only(WorkerRecord& worker, const List& keeps, double held_s
   worker.holds = std::move(kept);
   // From the last to the first, so that they wait in the order in which they went out.
   for (auto attempt = lost.rbegin(); attempt != lost.rend(); ++attempt) {
-    if (queue_.give_back(worker.id, *attempt)) ++counts_.retries;
+    if (queue_.give_back(worker.id, *attempt)) ++tally_.retries;
   }
   if (!lost.empty()) line_up(worker);
 }
@@ -246,7 +249,7 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
 
 bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double now) {
   if (result->epoch() != options_.epoch) {
-    ++counts_.foreign;
+    ++tally_.foreign;
     return true;
   }
   const std::uint64_t attempt = result->attempt_id();
@@ -254,7 +257,7 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double no
   const Committed committed = queue_.commit(registry_.identity(worker), result);
   if (committed.kind == Commit::kNoAnswer) {
     // Broken or lying: nothing else that it says is worth waiting for.
-    ++counts_.malformed;
+    ++tally_.malformed;
     const std::string reason = "it answered a task with something that is no result of it";
     post(worker.peer).mutable_refusal()->set_reason(reason);
     dismiss(worker, FarmEvent::kBadMessage, "is refused: " + reason);
@@ -274,11 +277,11 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double no
 }
 
 void Scheduler::on_committed(const Committed& committed) {
-  if (committed.kind == Commit::kForeign) ++counts_.foreign;
-  if (committed.kind == Commit::kLate) ++counts_.late;
+  if (committed.kind == Commit::kForeign) ++tally_.foreign;
+  if (committed.kind == Commit::kLate) ++tally_.late;
   cancel(committed.losers);
   if (!committed.disagreement) return;
-  ++counts_.disagreements;
+  ++tally_.alarms;
   const Disagreement& d = *committed.disagreement;
   report(FarmEvent::kDisagreement, d.second->name,
          d.question + " has two answers: " + d.first->name + " on " + d.first->host +
@@ -290,7 +293,7 @@ void Scheduler::on_dropped(WorkerRecord& worker, const v1::ResultBatch& batch) {
   if (batch.epoch() != options_.epoch) return;
   for (std::uint64_t attempt : batch.dropped()) {
     if (drop_holding(worker, attempt)) line_up(worker);
-    if (queue_.give_back(worker.id, attempt)) ++counts_.retries;
+    if (queue_.give_back(worker.id, attempt)) ++tally_.retries;
   }
 }
 
@@ -308,7 +311,7 @@ void Scheduler::take_offers() {
     const Committed committed = queue_.commit_question(offered.by, offered.answer.question(),
                                                        offered.answer.mutable_result());
     if (committed.kind == Commit::kForeign) continue;
-    if (committed.kind == Commit::kDone) ++counts_.offered;
+    if (committed.kind == Commit::kDone) ++tally_.handed_over;
     on_committed(committed);
   }
   offers_.clear();
@@ -330,7 +333,7 @@ void Scheduler::on_unsent(const std::vector<Outgoing>& messages) {
     if (worker == nullptr) continue;
     for (const v1::Job& job : message.envelope.batch().jobs()) {
       drop_holding(*worker, job.attempt_id());
-      if (queue_.give_back(worker->id, job.attempt_id())) ++counts_.retries;
+      if (queue_.give_back(worker->id, job.attempt_id())) ++tally_.retries;
     }
   }
   for (const Outgoing& message : messages) {
@@ -350,7 +353,7 @@ void Scheduler::dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::s
   report(kind, name, text);
 }
 
-void Scheduler::on_process_end(const WorkerEnd& end) {
+void Scheduler::on_process_end(const ProcessEnded& end) {
   WorkerRecord* worker = registry_.find_name(end.name);
   if (worker != nullptr) dismiss(*worker, FarmEvent::kDied, end.text);
   const auto departed = departed_.find(end.name);
@@ -358,9 +361,9 @@ void Scheduler::on_process_end(const WorkerEnd& end) {
   if (end.epoch != options_.epoch || end.attempt == 0) return;
   Blamed blamed = queue_.blame(*departed->second, end.attempt, end.cause, end.failure);
   departed_.erase(departed);
-  if (end.cause == EndCause::kHung) ++counts_.hung;
+  if (end.cause == EndCause::kHung) ++tally_.hung;
   if (!blamed.quarantined) return;
-  ++counts_.quarantined;
+  ++given_up_;
   blamed.reason += values_of_task(blamed.task);
   if (quarantine_reasons_.size() >= kReasonsKept) quarantine_reasons_.pop_front();
   quarantine_reasons_.push_back(blamed.reason);

@@ -48,7 +48,7 @@ struct JobEvent {
 struct SchedulerOptions {
   std::uint64_t epoch = 1;  // of this life of the master; > 0
   Admittance admittance;
-  JobLimits limits;
+  JobLimits job_limits;
   CopyOptions copies;
   unsigned window = 2;  // jobs in a worker's hand
   // Tasks shorter than a round trip need more in hand: as many as last so long, at most window_max.
@@ -62,27 +62,6 @@ struct SchedulerOptions {
   std::optional<std::uint64_t> shuffle_seed;
   std::function<void(const FarmEvent&)> on_event;
   std::function<void(const JobEvent&)> on_job;  // may be empty
-};
-
-struct SchedulerCounts {
-  std::uint64_t retries = 0;      // jobs that went back into the line
-  std::uint64_t late = 0;         // answers to jobs that had one
-  std::uint64_t foreign = 0;      // answers to nothing that was asked, or of another epoch
-  std::uint64_t malformed = 0;    // messages that are no envelope, or not for a master
-  std::uint64_t quarantined = 0;  // jobs
-  std::uint64_t hung = 0;         // workers that were killed because their simulation hung
-  std::uint64_t offered = 0;      // answers that workers kept from an earlier life of the master
-  std::uint64_t disagreements = 0;
-};
-
-// How a worker's process ended, and what it had in work.
-struct WorkerEnd {
-  std::string name;
-  EndCause cause = EndCause::kLeft;
-  std::uint64_t epoch = 0;
-  std::uint64_t attempt = 0;  // 0: nothing
-  std::string text;
-  std::string failure = {};  // what it reported of why it ended (ProcessEnded)
 };
 
 struct Outgoing {
@@ -119,7 +98,7 @@ class Scheduler {
   void on_other_protocol(const std::string& peer, std::uint32_t protocol);
   // These messages did not go out: nobody is there, or does not take its messages any more.
   void on_unsent(const std::vector<Outgoing>& messages);
-  void on_process_end(const WorkerEnd& end);
+  void on_process_end(const ProcessEnded& end);
   // Gives out jobs, without judging anybody.
   void dispatch(double now);
   // Judges silence and gives out jobs.  Call when all messages that have arrived are handled: what
@@ -136,11 +115,8 @@ class Scheduler {
   const WorkerRegistry& workers() const { return registry_; }
   std::vector<WorkerStatus> worker_status() const { return registry_.status(last_tick_); }
   std::vector<FleetStatus> fleet_status() const { return fleets_.status(last_tick_); }
-  const SchedulerCounts& counts() const { return counts_; }
-  // Answers that were compared with another worker's, and jobs given to a second worker because the
-  // first took long.
-  std::uint64_t compared() const { return queue_.compared(); }
-  std::uint64_t copied() const { return queue_.copied(); }
+  FarmTally tally() const;                              // but for the links
+  std::uint64_t given_up() const { return given_up_; }  // jobs
   // What was given up and why, of this life of the master; the latest.
   const std::deque<std::string>& quarantine_reasons() const { return quarantine_reasons_; }
 
@@ -189,7 +165,8 @@ class Scheduler {
   std::deque<Offered> offers_;  // that came between batches
   std::deque<std::string> quarantine_reasons_;
   std::vector<Outgoing> outbox_;
-  SchedulerCounts counts_;
+  FarmTally tally_;
+  std::uint64_t given_up_ = 0;
   double last_tick_ = -1;
   bool leaving_ = false;
   std::set<std::string> unanswered_;  // peers that have not answered the goodbye

@@ -133,4 +133,11 @@ void Scheduler::on_fleet(const std::string& peer, const v1::Fleet& fleet, double
   }
 }
 
+FarmTally Scheduler::tally() const {
+  FarmTally tally = tally_;
+  tally.compared = queue_.compared();
+  tally.copies = queue_.copied();
+  return tally;
+}
+
 }  // namespace gapfarm

@@ -8,7 +8,7 @@
 #include <unordered_map>
 
 #include "gapfarm/v1/farm.pb.h"
-#include "master/farm/answer_watch.h"
+#include "master/farm/worker_identity.h"
 
 namespace gapfarm {
 

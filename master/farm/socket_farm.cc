@@ -82,17 +82,9 @@ Status SocketFarm::Impl::open() {
   if (options.local_workers == 0 && options.listen.empty()) {
     return Error{"the farm has no local workers and listens nowhere; give it one or the other"};
   }
-  SchedulerOptions settings;
+  SchedulerOptions settings = options;
   settings.epoch = unique_epoch(options.epoch);
-  settings.admittance = {build_info().fingerprint, options.numeric_class,
-                         options.allow_mixed_numeric_classes};
-  settings.window = options.window;
-  settings.heartbeat_interval_s = options.heartbeat_interval_s;
-  settings.silence_limit_s = options.silence_limit_s;
-  settings.limits = options.job_limits;
-  settings.copies = options.copies;
-  settings.shuffle_seed = options.shuffle_seed;
-  settings.on_job = options.on_job;
+  settings.admittance.fingerprint = build_info().fingerprint;
   settings.on_event = [this](const FarmEvent& event) { on_event(event); };
   scheduler = std::make_unique<Scheduler>(std::move(settings));
 
@@ -127,7 +119,7 @@ void SocketFarm::Impl::reap(double now) {
   }
   if (!locals) return;
   for (const ProcessEnded& end : locals->pool().reap(now)) {
-    scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text, end.failure});
+    scheduler->on_process_end(end);
     if (end.gave_up) {
       if (last_trouble.empty()) last_trouble = end.text;
       on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again", ""});
@@ -275,24 +267,26 @@ std::vector<WorkerStatus> SocketFarm::workers() const { return impl_->scheduler-
 
 std::vector<FleetStatus> SocketFarm::fleets() const { return impl_->scheduler->fleet_status(); }
 
-std::uint64_t SocketFarm::retries() const { return impl_->scheduler->counts().retries; }
+std::vector<std::string> SocketFarm::endpoints() const { return impl_->endpoints; }
 
-const std::vector<std::string>& SocketFarm::endpoints() const { return impl_->endpoints; }
+FarmTally SocketFarm::tally() const {
+  FarmTally tally = impl_->scheduler->tally();
+  const LinkCounts links = impl_->socket->link_counts();
+  tally.links = links.accepted;
+  tally.refused_keys = links.refused_keys;
+  tally.failed_handshakes = links.failed_handshakes;
+  tally.dropped_links = links.dropped;
+  return tally;
+}
 
-std::uint64_t SocketFarm::compared() const { return impl_->scheduler->compared(); }
+std::uint64_t SocketFarm::given_up() const { return impl_->scheduler->given_up(); }
 
-std::uint64_t SocketFarm::copied() const { return impl_->scheduler->copied(); }
+std::string SocketFarm::numeric_class() const {
+  return impl_->scheduler->workers().numeric_class();
+}
 
 const std::deque<std::string>& SocketFarm::quarantine_reasons() const {
   return impl_->scheduler->quarantine_reasons();
-}
-
-const SchedulerCounts& SocketFarm::counts() const { return impl_->scheduler->counts(); }
-
-LinkCounts SocketFarm::link_counts() const { return impl_->socket->link_counts(); }
-
-const std::string& SocketFarm::numeric_class() const {
-  return impl_->scheduler->workers().numeric_class();
 }
 
 std::vector<int> SocketFarm::local_pids() const {

@@ -11,38 +11,28 @@
 #include "common/base/result.h"
 #include "common/net/socket.h"
 #include "common/process/stop.h"
-#include "master/farm/answer_watch.h"
 #include "master/farm/farm.h"
 #include "master/farm/scheduler.h"
 
 namespace gapfarm {
 
-struct SocketFarmOptions {
+// Of the scheduler's the epoch counts lives of the master so far, below 2^24; the build's
+// fingerprint is filled in; without `on_event` what went wrong goes to stderr.
+struct SocketFarmOptions : SchedulerOptions {
   unsigned local_workers = 0;       // processes to start on this machine
   std::vector<std::string> listen;  // endpoints for workers that come by themselves
   LinkSecurity security;            // of tcp:// endpoints; without it they cannot be listened on
   LinkLimits limits;
   std::string worker_program;  // empty: find_worker_program()
-  std::uint64_t epoch = 0;     // lives of the master so far, below 2^24
-  std::string numeric_class;   // of the run; empty: the first worker's
-  bool allow_mixed_numeric_classes = false;
-  unsigned window = 2;
-  double heartbeat_interval_s = 1;
-  double silence_limit_s = 10;
   ProcessLimits local_limits;  // of the local workers; others have their own supervisors
-  JobLimits job_limits;
-  CopyOptions copies;
-  std::optional<std::uint64_t> shuffle_seed;       // jobs go out in shuffled order
-  StopSource* stop = nullptr;                      // ends run(); not owned, outlives the farm
-  std::function<void(const FarmEvent&)> on_event;  // empty: what went wrong goes to stderr
-  std::function<void(const JobEvent&)> on_job;     // may be empty
+  StopSource* stop = nullptr;  // ends run(); not owned, outlives the farm
 };
 
 // Error: a problem too large for a message to a worker.
 Status check_sendable(const v1::Problem& problem);
 
 // Belongs to the thread that made it, which must live as long: the local workers die with it.
-class SocketFarm : public Farm, public AnswerSource {
+class SocketFarm : public Farm {
  public:
   // Listens and starts the local workers.  Errors: an endpoint that cannot be bound, no worker
   // program, neither local workers nor an endpoint.
@@ -64,18 +54,13 @@ class SocketFarm : public Farm, public AnswerSource {
   void watch_answers(AnswerWatcher watcher) override;
   std::vector<WorkerStatus> workers() const override;
   std::vector<FleetStatus> fleets() const override;
-  std::uint64_t retries() const override;
+  std::vector<std::string> endpoints() const override;
+  FarmTally tally() const override;
+  std::uint64_t given_up() const override;
+  std::string numeric_class() const override;
 
-  // As bound: ports are filled in.
-  const std::vector<std::string>& endpoints() const;
-  const SchedulerCounts& counts() const;
-  LinkCounts link_counts() const;
   // See Scheduler.
-  std::uint64_t compared() const;
-  std::uint64_t copied() const;
   const std::deque<std::string>& quarantine_reasons() const;
-  // Of the run; empty before the first worker.
-  const std::string& numeric_class() const;
   // Pids of the running local workers.
   std::vector<int> local_pids() const;
 

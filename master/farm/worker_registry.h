@@ -10,8 +10,8 @@
 
 #include "common/process/process_pool.h"
 #include "gapfarm/v1/farm.pb.h"
-#include "master/farm/answer_watch.h"
 #include "master/farm/farm.h"
+#include "master/farm/worker_identity.h"
 
 namespace gapfarm {
 

@@ -16,26 +16,6 @@ constexpr unsigned kMostFailureNotes = 100;
 constexpr std::size_t kMostWorkerEvents = 20000;  // of a master
 constexpr double kWriteInterval_s = 1;            // each costs a disk write
 
-FarmTally tally_of(const SocketFarm& farm) {
-  const SchedulerCounts& counts = farm.counts();
-  FarmTally tally;
-  tally.retries = counts.retries;
-  tally.hung = counts.hung;
-  tally.copies = farm.copied();
-  tally.compared = farm.compared();
-  tally.alarms = counts.disagreements;
-  tally.handed_over = counts.offered;
-  tally.late = counts.late;
-  tally.foreign = counts.foreign;
-  tally.malformed = counts.malformed;
-  const LinkCounts links = farm.link_counts();
-  tally.links = links.accepted;
-  tally.refused_keys = links.refused_keys;
-  tally.failed_handshakes = links.failed_handshakes;
-  tally.dropped_links = links.dropped;
-  return tally;
-}
-
 std::optional<IncidentKind> incident_of(FarmEvent::Kind kind) {
   if (kind == FarmEvent::kQuarantined) return IncidentKind::kQuarantine;
   if (kind == FarmEvent::kDisagreement) return IncidentKind::kAlarm;
@@ -80,24 +60,7 @@ std::string failures_among(const Problem& problem, const std::vector<v1::Task>& 
          (why.empty() ? "diverged" : why) + "; " + point_settings(problem, tasks[last]);
 }
 
-class OverSockets : public FarmOfRun {
- public:
-  explicit OverSockets(std::unique_ptr<SocketFarm> farm) : farm_(std::move(farm)) {}
-  Farm& farm() override { return *farm_; }
-  FarmTally tally() const override { return tally_of(*farm_); }
-  std::uint64_t given_up() const override { return farm_->counts().quarantined; }
-  std::string numeric_class() const override { return farm_->numeric_class(); }
-  std::vector<std::string> endpoints() const override { return farm_->endpoints(); }
-
- private:
-  std::unique_ptr<SocketFarm> farm_;
-};
-
 }  // namespace
-
-std::unique_ptr<FarmOfRun> farm_of_run(std::unique_ptr<SocketFarm> farm) {
-  return std::make_unique<OverSockets>(std::move(farm));
-}
 
 void FarmEventKeeper::keep(const FarmEvent& event) {
   const std::optional<IncidentKind> kind = incident_of(event.kind);
@@ -124,7 +87,7 @@ void FarmEventKeeper::flush() {
   waiting_.clear();
 }
 
-FarmProgressWriter::FarmProgressWriter(RunStore& store, FarmOfRun& farm,
+FarmProgressWriter::FarmProgressWriter(RunStore& store, Farm& farm,
                                        const EvolutionSettings& settings,
                                        const std::optional<Checkpoint>& resumed,
                                        const EvolveClock& clock, RunWatcher& watcher)
@@ -214,7 +177,7 @@ void FarmProgressWriter::refresh(double now_s) {
   pace.evaluations_here = done;
   pace.wall_here_s = spent_s;
   last_.time_left_s = time_left_s(settings_, pace);
-  const std::vector<WorkerStatus> workers = farm_.farm().workers();
+  const std::vector<WorkerStatus> workers = farm_.workers();
   const bool waited = !last_.waiting.empty();
   last_.waiting = wait_.message(workers.size(), now_s).value_or("");
   watcher_.progress("evolve: " + (last_.waiting.empty() ? message(pace) : last_.waiting),
@@ -222,11 +185,8 @@ void FarmProgressWriter::refresh(double now_s) {
   if (now_s - written_s_ < kWriteInterval_s) return;
   written_s_ = now_s;
   if (events_ != nullptr) events_->flush();
-  last_.workers.clear();
-  for (const WorkerStatus& w : workers) {
-    last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});
-  }
-  last_.fleets = farm_.farm().fleets();
+  last_.workers = workers;
+  last_.fleets = farm_.fleets();
   last_.farm = farm_.tally();
   // The live row is a courtesy: a run goes on when it cannot be written, and a commit that cannot
   // be written stops it with the reason.

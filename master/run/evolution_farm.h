@@ -2,7 +2,6 @@
 #pragma once
 
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,7 +13,7 @@
 #include "common/progress/overall_progress.h"
 #include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
-#include "master/farm/socket_farm.h"
+#include "master/farm/scheduler.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
@@ -31,20 +30,6 @@ class RunWatcher {
   // A log that the run takes beside its own.
   virtual void read(const TrialLog&) {}
 };
-
-// A farm with what a run keeps of it.
-class FarmOfRun {
- public:
-  virtual ~FarmOfRun() = default;
-  virtual Farm& farm() = 0;
-  virtual FarmTally tally() const = 0;
-  virtual std::uint64_t given_up() const = 0;  // tasks
-  // See SocketFarm.
-  virtual std::string numeric_class() const = 0;
-  virtual std::vector<std::string> endpoints() const = 0;
-};
-
-std::unique_ptr<FarmOfRun> farm_of_run(std::unique_ptr<SocketFarm> farm);
 
 // Keeps what a farm reports in the store: at once what was lost or is contradictory (of the alarms
 // only the first hundred: each costs a disk write, and a machine that computes wrongly raises one
@@ -70,7 +55,7 @@ class FarmEventKeeper {
 class FarmProgressWriter {
  public:
   // `resumed`: where the run goes on; none at its start.
-  FarmProgressWriter(RunStore& store, FarmOfRun& farm, const EvolutionSettings& settings,
+  FarmProgressWriter(RunStore& store, Farm& farm, const EvolutionSettings& settings,
                      const std::optional<Checkpoint>& resumed, const EvolveClock& clock,
                      RunWatcher& watcher);
 
@@ -92,7 +77,7 @@ class FarmProgressWriter {
   std::string message(const Pace& pace) const;
 
   RunStore& store_;
-  FarmOfRun& farm_;
+  Farm& farm_;
   const EvolutionSettings& settings_;
   const EvolveClock& clock_;
   RunWatcher& watcher_;
@@ -132,8 +117,7 @@ class FarmBackend : public EvaluationBackend {
 
 class StoreSink : public GenerationSink {
  public:
-  StoreSink(RunStore& store, const Problem& problem, const FarmOfRun& farm,
-            FarmProgressWriter& progress)
+  StoreSink(RunStore& store, const Problem& problem, const Farm& farm, FarmProgressWriter& progress)
       : store_(store), problem_(problem), farm_(farm), progress_(progress) {}
   Status commit(const GenerationRecord& record) override;
   // Tasks that this master's farm gave up, of the generations committed here.
@@ -142,7 +126,7 @@ class StoreSink : public GenerationSink {
  private:
   RunStore& store_;
   const Problem& problem_;
-  const FarmOfRun& farm_;
+  const Farm& farm_;
   FarmProgressWriter& progress_;
   std::uint64_t quarantined_ = 0;
 };

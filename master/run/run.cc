@@ -100,8 +100,8 @@ Status write_end(RunStore& store, Progress progress, RunState state, const std::
 }
 
 // How the run's results do on what was held out.
-Result<std::vector<Validated>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
-                                            const Genome& best) {
+Result<std::vector<ScoreRow>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
+                                           const Genome& best) {
   ASSIGN_OR_RETURN(const auto checkpoint, store.checkpoint());
   std::vector<Genome> stages;
   if (checkpoint) stages = stage_results(checkpoint->optimiser_state, apart.genes.size());
@@ -142,7 +142,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   FarmEventKeeper events(store, watcher);
   auto farm = request.open_farm([&](const FarmEvent& event) { events.keep(event); });
   if (!farm) return stopped_by(store, farm.error());
-  auto optimiser = optimiser_of(*inputs, request, (*farm)->farm(), watcher);
+  auto optimiser = optimiser_of(*inputs, request, **farm, watcher);
   if (!optimiser) {
     events.flush();
     Progress last;
@@ -159,7 +159,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,
                               watcher);
   progress.watch(&request.log, &events);
-  FarmBackend backend((*farm)->farm(), request.problem, request.config.seed, progress);
+  FarmBackend backend(**farm, request.problem, request.config.seed, progress);
   StoreSink sink(store, request.problem, **farm, progress);
   EvolveOptions options;
   options.settings = request.config.evolution;
@@ -176,7 +176,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));
   if (summary.stopped()) return summary;
   if (summary.evolved.best && summary.evolved.best->outcome == v1::OK) {
-    const Status left = leave_model(store, request, *inputs, (*farm)->farm(), watcher, summary);
+    const Status left = leave_model(store, request, *inputs, **farm, watcher, summary);
     // Finished is what has its model; resumed, it only leaves that behind.
     if (!left) return stopped_by(store, left.error(), progress.now());
   }
@@ -222,9 +222,9 @@ Status check_runnable(const Config& config) {
   return log ? Status() : Status(log.error());
 }
 
-Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
-                                        const std::vector<Genome>& stages, const Genome& best) {
-  std::vector<Validated> rows = {{"the config's own values", {}}};
+Result<std::vector<ScoreRow>> validate(Farm& farm, const Problem& apart,
+                                       const std::vector<Genome>& stages, const Genome& best) {
+  std::vector<ScoreRow> rows = {{"the config's own values", {}}};
   std::vector<Genome> genomes = {{}};
   for (std::size_t i = 0; i < stages.size(); ++i) {
     rows.push_back({"after stage " + std::to_string(i + 1), {}});
@@ -236,7 +236,7 @@ Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
   for (const Genome& genome : genomes) tasks.push_back(evaluation_task({0, 0, genome}, 0));
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(apart)), tasks));
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (results[i].outcome() == v1::OK) rows[i].fitness = results[i].evaluate().fitness();
+    if (results[i].outcome() == v1::OK) rows[i].score = results[i].evaluate().fitness();
   }
   return rows;
 }

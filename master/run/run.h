@@ -15,15 +15,11 @@
 #include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
 #include "master/farm/farm.h"
+#include "master/report/run/run_report.h"
 #include "master/run/evolution_farm.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
-
-struct Validated {
-  std::string name;  // "the config's own values", "after stage 1", "the best"
-  std::optional<double> fitness;
-};
 
 // The problem with what [validation] holds out in place of its trials; none when it names none.
 // Errors: of reading, a file or folder that is among those evolved on.
@@ -34,15 +30,15 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
 Status check_runnable(const Config& config);
 
 // Fitness on what was held out of the problem's own values, each stage's result and the best.
-Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
-                                        const std::vector<Genome>& stages, const Genome& best);
+Result<std::vector<ScoreRow>> validate(Farm& farm, const Problem& apart,
+                                       const std::vector<Genome>& stages, const Genome& best);
 
 struct RunRequest {
   const Config& config;  // overrides applied; its log may be empty
   const Problem& problem;
   Log& log;
   // Called once all inputs are known to be sound.  What happens in the farm goes to `keep`.
-  std::function<Result<std::unique_ptr<FarmOfRun>>(std::function<void(const FarmEvent&)> keep)>
+  std::function<Result<std::unique_ptr<Farm>>(std::function<void(const FarmEvent&)> keep)>
       open_farm;
   std::function<bool()> stop_requested;  // may be empty; the farm is notified separately
 };
@@ -51,8 +47,8 @@ struct RunSummary {
   EvolveSummary evolved;
   // Tasks given up, by this master and those before it.
   std::uint64_t given_up = 0;
-  std::size_t held_out = 0;          // trials or windows
-  std::vector<Validated> validated;  // on those
+  std::size_t held_out = 0;         // trials or windows
+  std::vector<ScoreRow> validated;  // on those
   // Left in the run's folder; none where the run was stopped, or nothing ended well.
   std::vector<std::string> files;
 

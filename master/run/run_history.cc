@@ -105,11 +105,11 @@ Status add_densities(const RunReader& reader, const Problem& problem,
   std::erase_if(report->densities, [](const GeneDensity& d) { return d.generations.empty(); });
   // A front is shown as one.
   std::vector<StoredIndividual> elite = last;
-  ASSIGN_OR_RETURN(const RunFront front, run_front(reader, generations));
+  ASSIGN_OR_RETURN(report->front, run_front(reader, generations));
+  const RunFront& front = report->front;
   if (!front.members.empty()) {
     elite = front.members;
     std::swap(elite.front(), elite[front.knee]);
-    report->front = front_view(front, generations);
   }
   report->elite = run_elite(problem, elite);
   report->sample = run_sample(problem, sample);
@@ -165,23 +165,6 @@ constexpr std::size_t kMostMarks = 300;
 constexpr std::size_t kMostSpans = 40;
 constexpr std::size_t kMostRows = 200;  // in the table
 
-// Every count of a farm, for people.
-constexpr std::pair<std::uint64_t FarmTally::*, const char*> kTallyLabels[] = {
-    {&FarmTally::retries, "retries: jobs given out again"},
-    {&FarmTally::copies, "copies: jobs given to a second worker, the first took long"},
-    {&FarmTally::compared, "audits and copies: answers held against another worker's"},
-    {&FarmTally::alarms, "alarms: those of them that differed"},
-    {&FarmTally::hung, "workers killed because their simulation stood still"},
-    {&FarmTally::handed_over, "answers that workers kept from one master to the next"},
-    {&FarmTally::late, "late: answers to jobs that had one"},
-    {&FarmTally::foreign, "foreign: answers to nothing that was asked"},
-    {&FarmTally::malformed, "malformed: messages that made no sense"},
-    {&FarmTally::links, "TCP connections"},
-    {&FarmTally::refused_keys, "of them refused: keys that are not listed"},
-    {&FarmTally::failed_handshakes, "of them failed: handshakes"},
-    {&FarmTally::dropped_links, "of them closed by the limits"}};
-static_assert(std::size(kTallyLabels) == std::tuple_size_v<decltype(FarmTally::kRows)>);
-
 std::vector<std::string> log_tail(const std::filesystem::path& run) {
   std::ifstream file(run / "log.txt", std::ios::binary | std::ios::ate);
   if (!file) return {};
@@ -223,8 +206,8 @@ void add_facts(const RunStatus& status, RunFarm* farm) {
   add("last heard of", day_and_time(progress.heartbeat_unix_s) + " on " + progress.host);
   if (progress.epoch > 1) add("masters so far", std::to_string(progress.epoch));
   if (status.quarantined > 0) add("tasks given up", std::to_string(status.quarantined));
-  for (const auto& [count, tally_label] : kTallyLabels) {
-    farm->tally.emplace_back(tally_label, std::to_string(progress.farm.*count));
+  for (const FarmTally::Row& row : FarmTally::kRows) {
+    farm->tally.emplace_back(row.label, std::to_string(progress.farm.*row.count));
   }
 }
 
@@ -295,13 +278,13 @@ Status add_workers(const RunReader& reader, bool running, RunFarm* farm) {
     if (farm->failures.size() == kMostFailures) break;
     if (is_failure(*it)) farm->failures.push_back(sentence_of(*it));
   }
-  for (const StoredWorker& w : progress.workers) {
+  for (const WorkerStatus& w : progress.workers) {
     if (farm->workers.size() == kMostRows) break;
     const auto failure = failures.find(w.name);
+    RunWorker& worker = farm->workers.emplace_back(RunWorker{w, ""});
     // Whoever is not watched any more is neither busy nor idle.
-    farm->workers.push_back(
-        {w.name, w.host, running || w.state == "gone" ? w.state : "was " + w.state, w.jobs,
-         w.finished, w.rate_per_s, failure == failures.end() ? "" : failure->second});
+    if (!running && w.state != "gone") worker.state = "was " + w.state;
+    if (failure != failures.end()) worker.failure = failure->second;
   }
   farm->timeline = timeline_of(events, progress.heartbeat_unix_s, running);
   return {};

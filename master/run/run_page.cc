@@ -164,14 +164,14 @@ v1::Task predict_task(const Genome& genome) {
 std::vector<ScoreRow> baseline_rows(const std::vector<BaselineComparison>& comparisons) {
   std::vector<ScoreRow> rows;
   for (const BaselineComparison& c : comparisons) {
-    rows.push_back({fmt::format("{}, {} trials", c.name, c.trials), c.baseline, {}, {}});
-    rows.push_back({"the best, on the same trials", c.model, {}, {}});
+    rows.push_back({fmt::format("{}, {} trials", c.name, c.trials), c.baseline});
+    rows.push_back({"the best, on the same trials", c.model});
   }
   return rows;
 }
 
 Status write_poses(RunStore& store, const Problem& problem, const EvolveSummary& summary,
-                   Farm& farm, const std::vector<Validated>& validated) {
+                   Farm& farm, const std::vector<ScoreRow>& validated) {
   // As the config had them, and as evolved.
   ASSIGN_OR_RETURN(const auto results,
                    farm.run(farm.add_problem(to_proto(problem)),
@@ -219,7 +219,7 @@ Status write_page(const RunStore& store) {
 }  // namespace
 
 RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
-                       const PredictionOfLog* after, const std::vector<Validated>& validated) {
+                       const PredictionOfLog* after, const std::vector<ScoreRow>& validated) {
   const std::vector<DrivenCommand> driven = driven_commands(problem.log, problem.commands);
   const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
   RunOutcome outcome;
@@ -242,9 +242,7 @@ RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
     trial.tuned_score = first.score, trial.final_score = last.score;
     outcome.trials.push_back(std::move(trial));
   }
-  for (const Validated& row : validated) {
-    outcome.validation.push_back({row.name, row.fitness, {}, {}});
-  }
+  outcome.validation = validated;
   return outcome;
 }
 
@@ -326,7 +324,7 @@ std::vector<std::string> output_files(const Problem& problem) {
 
 Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
                      const EvolveSummary& summary, Farm& farm,
-                     const std::vector<Validated>& validated) {
+                     const std::vector<ScoreRow>& validated) {
   const Model model = model_of(store, problem, config, summary);
   RETURN_IF_ERROR(write_model(model, (store.run() / "model.toml").string()));
   if (!is_value(problem.fitness.kind)) {

@@ -19,7 +19,7 @@ namespace gapfarm {
 // The log as the config's values and the best predict it, for RunStore::keep_document().  Where one
 // of the two did not end well its poses are not numbers.
 RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
-                       const PredictionOfLog* after, const std::vector<Validated>& validated);
+                       const PredictionOfLog* after, const std::vector<ScoreRow>& validated);
 
 // The document's name in the store.
 inline constexpr const char* kOutcomeDocument = "outcome";
@@ -41,6 +41,6 @@ std::vector<std::string> output_files(const Problem& problem);
 // `validated`: what is known of trials held out.  REQUIRES: a best member whose outcome is OK.
 Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
                      const EvolveSummary& summary, Farm& farm,
-                     const std::vector<Validated>& validated);
+                     const std::vector<ScoreRow>& validated);
 
 }  // namespace gapfarm

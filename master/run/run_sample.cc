@@ -20,7 +20,6 @@ namespace {
 constexpr std::size_t kMostEvaluated = 1000;
 constexpr std::size_t kMostElite = 30;
 constexpr std::size_t kMostFront = 100;  // of its lines over all genes
-constexpr std::size_t kMostVolumes = 1000;
 
 // Columns of numbers, one each of the outputs.
 std::vector<std::vector<double>> ranks_of(const std::vector<const StoredIndividual*>& members,
@@ -100,27 +99,6 @@ RunElite run_elite(const Problem& problem, const std::vector<StoredIndividual>& 
     }
   }
   return elite;
-}
-
-RunFrontView front_view(const RunFront& front, const std::vector<StoredGeneration>& generations) {
-  RunFrontView view;
-  for (const SearchedObjective& o : front.objectives) {
-    view.objectives.push_back({o.name, o.maximise});
-  }
-  for (const StoredIndividual& member : front.members) {
-    RunFrontView::Member& added = view.members.emplace_back();
-    added.birth_id = member.birth_id;
-    for (const auto& [name, value] : member.objectives) added.values.push_back(value);
-  }
-  view.knee = front.knee;
-  view.reference = front.reference;
-  for (std::size_t i = 0; i < generations.size(); ++i) {
-    const std::optional<double>& volume = front.hypervolume[i];
-    if (volume) view.hypervolume.emplace_back(generations[i].generation, *volume);
-  }
-  view.hypervolume =
-      decimated(view.hypervolume, kMostVolumes, [](const auto& at) { return at.second; });
-  return view;
 }
 
 Result<std::string> history_csv(const RunReader& reader) {

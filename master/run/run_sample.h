@@ -12,8 +12,6 @@ namespace gapfarm {
 // The first of `last` over its objectives, where there are several, and its genes.
 RunElite run_elite(const Problem& problem, const std::vector<StoredIndividual>& last);
 
-RunFrontView front_view(const RunFront& front, const std::vector<StoredGeneration>& generations);
-
 // `members`: each once, with a fitness.  The importance of a gene is first_order_index() on the
 // ranks of the fitness, or of each of several objectives: ranks, since a search that has settled
 // leaves few, wild values far away.

@@ -16,18 +16,6 @@
 namespace gapfarm {
 namespace {
 
-std::string stage_rows(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
-  std::string rows;
-  for (const AnsweredStage& stage : stages) {
-    const bool now = r.state == "running" && stage.name == r.stage;
-    rows +=
-        fmt::format(R"(<tr><th scope="row">{}</th>)", html_escaped(stage.name)) +
-        list_cell("simulations kept", number_text(static_cast<double>(stage.answers), 9), true) +
-        list_cell("", now ? R"(<span class="tag">now</span>)" : "") + "</tr>";
-  }
-  return rows;
-}
-
 std::string command_tiles(const CommandRecord& r) {
   const auto tile_of = [](const char* title, const std::string& value, const std::string& small) {
     return fmt::format(
@@ -39,7 +27,7 @@ std::string command_tiles(const CommandRecord& r) {
   std::string html = R"(<dl class="tiles" id="tiles" data-live>)";
   html += tile_of("Done", percent_text(r.share), bar_svg(r.share, "fill-named"));
   html +=
-      tile_of("Stage", fmt::format("{} of {}", r.stage_number, r.stages),
+      tile_of("Stage", fmt::format("{} of {}", r.number, r.stages),
               html_escaped(r.stage) + (r.total > 0 ? fmt::format(": {} of {}{}", r.done, r.total,
                                                                  simulates ? " simulations" : "")
                                                    : ""));
@@ -73,22 +61,21 @@ std::string finding_html(const Finding& found) {
   std::string html =
       "<h4>" + html_escaped(found.about) + "</h4><p>" + with_terms(found.text) + "</p>";
   if (found.rows.empty()) return html;
-  html += fmt::format(
-      R"(<table class="parts" data-file="{0}"><caption class="unseen">{0}</caption><thead><tr><th scope="col">{1}</th><th scope="col" class="number">{2}</th></tr></thead><tbody>)",
-      html_escaped(found.about), html_escaped(found.columns.first),
-      with_terms(found.columns.second));
+  std::vector<HtmlRow> rows;
   for (const auto& [name, value] : found.rows) {
-    html += R"(<tr><th scope="row">)" + html_escaped(name) + "</th>" +
-            list_cell("", html_escaped(value), true) + "</tr>";
+    rows.push_back({html_escaped(name), {html_escaped(value)}});
   }
-  return html + "</tbody></table>";
+  return html + html_table("parts", found.about, found.about,
+                           {{html_escaped(found.columns.first)},
+                            {with_terms(found.columns.second), "number"}},
+                           rows);
 }
 
 // Whether stage `k` of the plan is over, in work or to come, and how long it took.
 std::string stage_text(const CommandRecord& r, std::size_t k) {
   const double began_s = r.plan[k].began_unix_s;
-  const bool last = k + 1 >= r.stage_number;
-  if (k + 1 > r.stage_number) return r.state == "running" ? "to come" : "not reached";
+  const bool last = k + 1 >= r.number;
+  if (k + 1 > r.number) return r.state == "running" ? "to come" : "not reached";
   if (began_s == 0) return "not needed";
   double ended_s = r.heartbeat_unix_s;
   for (std::size_t j = k + 1; j < r.plan.size() && !last; ++j) {
@@ -105,7 +92,7 @@ std::string stage_text(const CommandRecord& r, std::size_t k) {
 std::string findings_list(const CommandRecord& r) {
   std::string html = R"(<ol class="stages">)";
   for (std::size_t k = 0; k < r.plan.size(); ++k) {
-    const bool now = r.state == "running" && k + 1 == r.stage_number;
+    const bool now = r.state == "running" && k + 1 == r.number;
     html +=
         fmt::format(R"(<li{}><h3>{} <small>{}</small></h3>)", now ? R"( aria-current="step")" : "",
                     html_escaped(r.plan[k].name), stage_text(r, k));
@@ -127,30 +114,37 @@ std::string found_section(const CommandRecord& r) {
 }
 
 std::string stages_section(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
+  std::vector<HtmlRow> rows;
+  for (const AnsweredStage& stage : stages) {
+    const bool now = r.state == "running" && stage.name == r.stage;
+    rows.push_back({html_escaped(stage.name),
+                    {number_text(static_cast<double>(stage.answers), 9),
+                     now ? R"(<span class="tag">now</span>)" : ""}});
+  }
   return R"(<section id="stages"><h2>What has been simulated</h2><p>By stage, in the order in which they began. What is kept is not simulated again.</p><div id="stage-table" data-live>)" +
-         (stages.empty()
-              ? std::string("<p>Nothing so far.</p>")
-              : R"(<table class="cards" data-file="stages"><caption class="unseen">Stages</caption><thead><tr><th scope="col">stage</th><th scope="col" class="number">simulations kept</th><th scope="col"></th></tr></thead><tbody>)" +
-                    stage_rows(r, stages) + "</tbody></table>") +
+         (rows.empty() ? "<p>Nothing so far.</p>"
+                       : html_table("cards", "stages", "Stages",
+                                    {{"stage"}, {"simulations kept", "number"}, {}}, rows)) +
          "</div></section>\n";
 }
 
 std::string workers_section(const CommandRecord& r) {
-  std::string workers;
-  for (const StoredWorker& w : r.workers) {
-    workers += R"(<tr><th scope="row">)" + html_escaped(w.name) + "</th>" +
-               list_cell("host", html_escaped(w.host)) + list_cell("state", html_escaped(w.state)) +
-               list_cell("finished", number_text(static_cast<double>(w.finished), 9), true) +
-               list_cell("jobs/s", number_text(w.rate_per_s), true) + "</tr>";
+  std::vector<HtmlRow> rows;
+  for (const WorkerStatus& w : r.workers) {
+    rows.push_back({html_escaped(w.name),
+                    {html_escaped(w.host), html_escaped(w.state),
+                     number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s)}});
   }
-  const char* none = r.state == "running"
-                         ? "<p>No worker has been heard of.</p>"
-                         : "<p>The command has ended, and with it its workers.</p>";
+  const std::string none = r.state == "running"
+                               ? "<p>No worker has been heard of.</p>"
+                               : "<p>The command has ended, and with it its workers.</p>";
   return R"(<section id="workers"><h2>Workers</h2><div id="worker-table" data-live>)" +
-         (workers.empty()
-              ? std::string(none)
-              : R"(<table class="cards" data-file="workers"><caption class="unseen">Workers</caption><thead><tr><th scope="col">worker</th><th scope="col">host</th><th scope="col">state</th><th scope="col" class="number">finished</th><th scope="col" class="number">jobs/s</th></tr></thead><tbody>)" +
-                    workers + "</tbody></table>") +
+         (rows.empty()
+              ? none
+              : html_table(
+                    "cards", "workers", "Workers",
+                    {{"worker"}, {"host"}, {"state"}, {"finished", "number"}, {"jobs/s", "number"}},
+                    rows)) +
          "</div></section>\n";
 }
 

@@ -70,9 +70,9 @@ std::size_t trials_of(const RunInfo& info) {
                                                : 0;
 }
 
-void count_workers(const std::vector<StoredWorker>& workers, bool running, WorkEntry* entry) {
+void count_workers(const std::vector<WorkerStatus>& workers, bool running, WorkEntry* entry) {
   if (!running) return;
-  for (const StoredWorker& worker : workers) {
+  for (const WorkerStatus& worker : workers) {
     ++entry->workers_by_state[worker.state];
     entry->workers += worker.state != "gone" ? 1 : 0;
   }

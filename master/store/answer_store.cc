@@ -6,7 +6,6 @@
 #include "common/base/try.h"
 #include "common/problem/problem.h"
 #include "common/problem/question.h"
-#include "common/process/process_pool.h"
 
 namespace gapfarm {
 namespace {
@@ -145,23 +144,18 @@ Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file
                        });
 }
 
-RecordedFarm::RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers)
-    : RecordedFarm(farm, store, answers, monotonic_seconds) {}
-
-RecordedFarm::RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers, Clock clock)
-    : farm_(farm), store_(store), source_(answers), clock_(clock) {
-  if (source_ == nullptr) return;
-  source_->watch_answers(
+RecordedFarm::RecordedFarm(std::shared_ptr<Farm> farm, AnswerStore* store, Clock clock)
+    : farm_(std::move(farm)), store_(store), clock_(clock) {
+  if (store_ == nullptr) return;
+  farm_->watch_answers(
       [this](std::size_t task, const v1::TaskResult& result) { on_answer(task, result); });
 }
 
-RecordedFarm::~RecordedFarm() {
-  if (source_ != nullptr) source_->watch_answers({});
-}
+RecordedFarm::~RecordedFarm() { farm_->watch_answers({}); }
 
 std::string RecordedFarm::add_problem(const v1::Problem& problem) {
-  std::string hash = farm_.add_problem(problem);
-  unkept_[hash] = serialise(problem);
+  std::string hash = farm_->add_problem(problem);
+  if (store_ != nullptr) unkept_[hash] = serialise(problem);
   return hash;
 }
 
@@ -170,18 +164,21 @@ Result<RecordedFarm::Open> RecordedFarm::look_up(const std::string& problem_hash
                                                  std::vector<v1::TaskResult>& results) {
   Open open;
   for (std::size_t i = 0; i < tasks.size(); ++i) {
-    std::string key = store_.key(problem_hash, tasks[i]);
-    ASSIGN_OR_RETURN(auto found, store_.find(key));
-    if (found) {
-      results[i] = std::move(*found);
-      continue;
+    std::string key;
+    if (store_ != nullptr) {
+      key = store_->key(problem_hash, tasks[i]);
+      ASSIGN_OR_RETURN(auto found, store_->find(key));
+      if (found) {
+        results[i] = std::move(*found);
+        continue;
+      }
     }
     open.tasks.push_back(tasks[i]);
     open.places.push_back(i);
     open.keys.push_back(std::move(key));
   }
-  open.kept.resize(open.tasks.size());
-  open.first_number = store_.reserve(open.tasks.size());
+  open.kept.resize(open.tasks.size(), store_ == nullptr);
+  if (store_ != nullptr) open.first_number = store_->reserve(open.tasks.size());
   return open;
 }
 
@@ -201,7 +198,7 @@ Status RecordedFarm::flush() {
   }
   flushed_s_ = clock_();
   if (answers.empty()) return {};
-  RETURN_IF_ERROR(store_.add(problem_hash_, stage_, answers));
+  RETURN_IF_ERROR(store_->add(problem_hash_, stage_, answers));
   for (const auto& [k, result] : waiting_) open_.kept[k] = true;
   waiting_.clear();
   return {};
@@ -215,7 +212,7 @@ Result<std::vector<v1::TaskResult>> RecordedFarm::run(
     const std::string& problem_hash, const std::vector<v1::Task>& tasks,
     const std::function<void(const FarmProgress&)>& on_progress) {
   if (const auto fresh = unkept_.find(problem_hash); fresh != unkept_.end()) {
-    RETURN_IF_ERROR(store_.add_problem(problem_hash, fresh->second));
+    RETURN_IF_ERROR(store_->add_problem(problem_hash, fresh->second));
     unkept_.erase(fresh);
   }
   std::vector<v1::TaskResult> results(tasks.size());
@@ -230,7 +227,7 @@ Result<std::vector<v1::TaskResult>> RecordedFarm::run(
   flushed_s_ = clock_();
   report_progress(0);
   if (open_.tasks.empty()) return results;
-  auto fresh = farm_.run(problem_hash, open_.tasks, [&](const FarmProgress& progress) {
+  auto fresh = farm_->run(problem_hash, open_.tasks, [&](const FarmProgress& progress) {
     report_progress(progress.done);
     if (on_progress) on_progress({at_hand + progress.done, tasks.size()});
   });

@@ -5,13 +5,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/process/process_pool.h"
 #include "gapfarm/v1/task.pb.h"
-#include "master/farm/answer_watch.h"
 #include "master/farm/farm.h"
 #include "master/store/database.h"
 
@@ -75,9 +76,6 @@ Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file
 // in a folder that cannot be written; none: it says nothing.  Errors: no answer store.
 Result<std::optional<std::string>> read_command(const std::filesystem::path& file);
 
-// A farm that remembers: what was asked before comes from the store, the rest from the farm behind
-// it and into the store.
-
 // What of a recorded farm's work is done, in all.
 struct RecordedProgress {
   std::uint64_t remembered = 0;  // answers that were at hand
@@ -85,14 +83,15 @@ struct RecordedProgress {
   std::uint64_t asked = 0;       // all tasks so far, of the batch in work too
 };
 
+// A farm that remembers: what was asked before comes from the store, the rest from the farm behind
+// it and into the store.
 class RecordedFarm : public Farm {
  public:
   // Seconds of a clock that never goes back.
   using Clock = double (*)();
 
-  // All outlive this.  `answers`: of the same farm; null: it does not report them one by one.
-  RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers = nullptr);
-  RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers, Clock clock);
+  // The store outlives this.  Null: nothing is remembered, and progress is shown all the same.
+  RecordedFarm(std::shared_ptr<Farm> farm, AnswerStore* store, Clock clock = monotonic_seconds);
   ~RecordedFarm() override;
   RecordedFarm& operator=(RecordedFarm&&) = delete;
 
@@ -104,14 +103,16 @@ class RecordedFarm : public Farm {
   }
 
   std::string add_problem(const v1::Problem& problem) override;
-  // Errors: the farm's and the store's.  Answers are kept as they come (AnswerSource), so that
+  // Errors: the farm's and the store's.  Answers are kept as they come, so that
   // neither an error nor the end of this process loses more than about a second's; those that say
   // more of the workers than of the question (WORKER_FAILED) are not kept.
   Result<std::vector<v1::TaskResult>> run(
       const std::string& problem_hash, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>& on_progress = {}) override;
-  std::vector<WorkerStatus> workers() const override { return farm_.workers(); }
-  std::uint64_t retries() const override { return farm_.retries(); }
+  std::vector<WorkerStatus> workers() const override { return farm_->workers(); }
+  std::vector<FleetStatus> fleets() const override { return farm_->fleets(); }
+  std::vector<std::string> endpoints() const override { return farm_->endpoints(); }
+  std::uint64_t given_up() const override { return farm_->given_up(); }
 
   std::uint64_t remembered() const { return remembered_; }
   std::uint64_t simulated() const { return simulated_; }
@@ -131,9 +132,8 @@ class RecordedFarm : public Farm {
   Status flush();
   void report_progress(std::uint64_t done);
 
-  Farm& farm_;
-  AnswerStore& store_;
-  AnswerSource* source_;
+  std::shared_ptr<Farm> farm_;
+  AnswerStore* store_;
   Clock clock_;
   std::string stage_;
   std::function<void(const RecordedProgress&)> watcher_;

@@ -39,7 +39,9 @@ constexpr auto kFleet = [](auto& v, auto& row) {
 constexpr auto kRecord = [](auto& v, auto& row) {
   FIELDS(command, state);
   v.field("stop_reason", row.reason);
-  FIELDS(stage, stage_number, stages);
+  FIELDS(stage);
+  v.field("stage_number", row.number);
+  FIELDS(stages);
   v.list("plan", row.plan, kStage);
   v.list("findings", row.findings, kStageFinding);
   FIELDS(done, total, share, rate_per_s, time_left_s, remembered, simulated, waiting);
@@ -70,12 +72,12 @@ CommandRecord command_record_of(const Json& json) {
   return LenientFields::read<CommandRecord>(json, kRecord);
 }
 
-Json workers_json(const std::vector<StoredWorker>& workers) {
+Json workers_json(const std::vector<WorkerStatus>& workers) {
   return FieldWriter::list(workers, kWorker);
 }
 
-std::vector<StoredWorker> workers_of(const Json& json) {
-  return LenientFields::list<StoredWorker>(json, kWorker);
+std::vector<WorkerStatus> workers_of(const Json& json) {
+  return LenientFields::list<WorkerStatus>(json, kWorker);
 }
 
 Json fleets_json(const std::vector<FleetStatus>& fleets) {

@@ -11,6 +11,7 @@
 #include "common/base/result.h"
 #include "common/json/json.h"
 #include "common/progress/finding.h"
+#include "common/progress/overall_progress.h"
 #include "master/store/records.h"
 
 namespace gapfarm {
@@ -30,22 +31,15 @@ struct StageFinding {
   Finding found;
 };
 
-struct CommandRecord {
-  std::string command;                          // "diagnose"
-  std::string arguments;                        // the whole command line
-  std::string state;                            // "running", "finished", "stopped", "failed"
-  std::string reason;                           // how it ended; empty while it runs
-  std::string stage;                            // "screen the catalogue"
-  std::uint64_t stage_number = 0, stages = 0;   // from 1
-  std::vector<StageRecord> plan;                // all stages in their order
-  std::vector<StageFinding> findings;           // so far, in the order in which they came
-  std::uint64_t done = 0, total = 0;            // tasks of the stage; total 0: unknown
-  double share = 0;                             // of the whole, [0, 1]
-  double rate_per_s = 0;                        // tasks simulated
-  std::optional<double> time_left_s;            // of the whole
-  std::uint64_t remembered = 0, simulated = 0;  // answers at hand, and new ones
-  std::string waiting;                          // what it waits for; empty: nothing
-  std::vector<StoredWorker> workers;
+struct CommandRecord : ProgressView {
+  std::string command;                 // "diagnose"
+  std::string arguments;               // the whole command line
+  std::string state;                   // "running", "finished", "stopped", "failed"
+  std::string reason;                  // how it ended; empty while it runs
+  std::vector<StageRecord> plan;       // all stages in their order
+  std::vector<StageFinding> findings;  // so far, in the order in which they came
+  std::string waiting;                 // what it waits for; empty: nothing
+  std::vector<WorkerStatus> workers;
   std::vector<FleetStatus> fleets;
   std::string listen;  // for workers: the first tcp:// endpoint; empty: none
   double began_unix_s = 0, heartbeat_unix_s = 0;

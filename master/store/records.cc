@@ -16,53 +16,23 @@ const char* run_state_name(RunState state) {
   return kNames[static_cast<std::size_t>(state)];
 }
 
-const std::array<FarmTally::Row, 13> FarmTally::kRows = {{
-    {"retries", &FarmTally::retries},
-    {"hung", &FarmTally::hung},
-    {"copies", &FarmTally::copies},
-    {"compared", &FarmTally::compared},
-    {"alarms", &FarmTally::alarms},
-    {"handed_over", &FarmTally::handed_over},
-    {"late", &FarmTally::late},
-    {"foreign", &FarmTally::foreign},
-    {"malformed", &FarmTally::malformed},
-    {"links", &FarmTally::links},
-    {"refused_keys", &FarmTally::refused_keys},
-    {"failed_handshakes", &FarmTally::failed_handshakes},
-    {"dropped_links", &FarmTally::dropped_links},
-}};
-
-FarmTally& FarmTally::operator+=(const FarmTally& other) {
-  for (const Row& row : kRows) this->*row.count += other.*row.count;
-  return *this;
-}
-
-std::string FarmTally::to_json(const std::vector<FleetStatus>& fleets,
-                               const std::string& listen) const {
+std::string farm_json(const FarmTally& tally, const Progress& progress) {
   Json json = Json::object();
-  for (const Row& row : kRows) json[row.key] = this->*row.count;
-  if (!listen.empty()) json["listen"] = listen;
-  if (!fleets.empty()) json["fleets"] = fleets_json(fleets);
+  for (const FarmTally::Row& row : FarmTally::kRows) json[row.key] = tally.*row.count;
+  if (!progress.listen.empty()) json["listen"] = progress.listen;
+  if (!progress.fleets.empty()) json["fleets"] = fleets_json(progress.fleets);
   return json_text(json);
 }
 
-FarmTally FarmTally::from_json(const std::string& text) {
-  FarmTally tally;
-  const auto json = parse_json(text);
-  if (!json.is_object()) return tally;
-  for (const Row& row : kRows) {
-    const auto found = json.find(row.key);
-    if (found != json.end() && found->is_number_unsigned()) {
-      tally.*row.count = found->get<std::uint64_t>();
-    }
-  }
-  return tally;
-}
-
-void FarmTally::read_farm(const std::string& text, Progress* progress) {
-  progress->farm = from_json(text);
+void read_farm(const std::string& text, Progress* progress) {
   const auto json = parse_json(text);
   if (!json.is_object()) return;
+  for (const FarmTally::Row& row : FarmTally::kRows) {
+    const auto found = json.find(row.key);
+    if (found != json.end() && found->is_number_unsigned()) {
+      progress->farm.*row.count = found->get<std::uint64_t>();
+    }
+  }
   LenientFields(json).field("listen", progress->listen);
   progress->fleets = fleets_of(json.value("fleets", Json()));
 }

@@ -1,7 +1,6 @@
 // What the run store keeps, as plain data (docs/run_store.md gives the tables behind it).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -9,7 +8,7 @@
 #include <vector>
 
 #include "common/problem/problem.h"
-#include "master/farm/sites/fleet_status.h"
+#include "master/farm/farm.h"
 
 namespace gapfarm {
 
@@ -62,46 +61,6 @@ struct StoredGeneration {
 enum class RunState { kRunning, kFinished, kStopped };
 const char* run_state_name(RunState state);
 
-struct StoredWorker {
-  std::string name;
-  std::string host;
-  std::string state;  // "idle", "busy", "gone"
-  unsigned jobs = 0;  // in its hands
-  std::uint64_t finished = 0;
-  double rate_per_s = 0;  // jobs, since it joined
-};
-
-// What the farm went through, counted over all masters that have written to the run.
-struct FarmTally {
-  std::uint64_t retries = 0;            // jobs that went back into the line
-  std::uint64_t hung = 0;               // workers that were killed because their simulation hung
-  std::uint64_t copies = 0;             // of stragglers' jobs, given to idle workers
-  std::uint64_t compared = 0;           // answers held against another worker's: audits and copies
-  std::uint64_t alarms = 0;             // of those, answers that differed
-  std::uint64_t handed_over = 0;        // answers that workers kept from one master to the next
-  std::uint64_t late = 0;               // answers to jobs that had one
-  std::uint64_t foreign = 0;            // answers to nothing that was asked
-  std::uint64_t malformed = 0;          // messages that made no sense
-  std::uint64_t links = 0;              // TCP connections that were accepted
-  std::uint64_t refused_keys = 0;       // handshakes with keys that are not listed
-  std::uint64_t failed_handshakes = 0;  // of any kind
-  std::uint64_t dropped_links = 0;      // connections closed by the limits
-
-  struct Row {
-    const char* key;
-    std::uint64_t FarmTally::*count;
-  };
-  static const std::array<Row, 13> kRows;  // every count, by its name in the store and in status
-
-  FarmTally& operator+=(const FarmTally& other);
-  // A JSON object, with what else is known of the farm; and back: what is no such object counts
-  // nothing.
-  std::string to_json(const std::vector<FleetStatus>& fleets = {},
-                      const std::string& listen = "") const;
-  static FarmTally from_json(const std::string& text);
-  static void read_farm(const std::string& text, struct Progress* progress);
-};
-
 enum class IncidentKind {
   kQuarantine,  // a task was given up: it ended too many workers
   kAlarm,       // two workers answered one task differently
@@ -140,7 +99,7 @@ struct Progress {
   double rate_per_s = 0;    // evaluations
   std::optional<double> time_left_s;
   std::uint64_t done = 0, total = 0;  // tasks of the generation in work
-  std::vector<StoredWorker> workers;
+  std::vector<WorkerStatus> workers;
   std::vector<FleetStatus> fleets;
   std::string listen;  // for workers: its first tcp:// endpoint; empty: none
   FarmTally farm;
@@ -150,6 +109,10 @@ struct Progress {
   double heartbeat_unix_s = 0;
   std::uint64_t epoch = 0;  // masters that have written to this run, this one included
 };
+
+// What `progress` says of its farm as a JSON object, and back: what is no such object says nothing.
+std::string farm_json(const FarmTally& tally, const Progress& progress);
+void read_farm(const std::string& text, Progress* progress);
 
 // {"mass": 0.35, "wheel_shape": "sphere"}: every searched parameter at `genome`.
 std::string readable_values(const Problem& problem, const Genome& genome);

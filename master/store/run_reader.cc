@@ -231,7 +231,7 @@ Result<Progress> RunReader::progress() const {
                       p.state = state_of(state);
                       (p.state == RunState::kRunning ? p.waiting : p.stop_reason) = reason;
                       p.workers = workers_of(parse_json(workers));
-                      FarmTally::read_farm(farm, &p);
+                      read_farm(farm, &p);
                       return p;
                     }));
   return found.value_or(Progress());

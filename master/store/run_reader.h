@@ -111,9 +111,9 @@ nlohmann::ordered_json search_start(const RunInfo& info);
 std::string search_start_text(const RunInfo& info);
 
 // docs/formats.md, "Status".
-Json workers_json(const std::vector<StoredWorker>& workers);
+Json workers_json(const std::vector<WorkerStatus>& workers);
 // What was written by hand or damaged reads as empty.
-std::vector<StoredWorker> workers_of(const Json& json);
+std::vector<WorkerStatus> workers_of(const Json& json);
 Json fleets_json(const std::vector<FleetStatus>& fleets);
 std::vector<FleetStatus> fleets_of(const Json& json);
 Json to_json(const RunStatus& status);

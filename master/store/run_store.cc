@@ -188,7 +188,9 @@ Status RunStore::load_before() {
                  ": table progress is empty: the file was changed by hand; restore a copy"};
   }
   ++epoch_;
-  farm_before_ = FarmTally::from_json(farm);
+  Progress before;
+  read_farm(farm, &before);
+  farm_before_ = before.farm;
   return {};
 }
 
@@ -267,8 +269,7 @@ Status RunStore::set_progress(const Progress& progress) {
       "rate_per_s = ?, time_left_s = ?, done = ?, total = ?, workers = ?, epoch = ?, farm = ?",
       run_state_name(progress.state), running ? progress.waiting : progress.stop_reason, ::getpid(),
       host_name(), unix_now_s(), progress.rate_per_s, progress.time_left_s, progress.done,
-      progress.total, json_text(workers_json(progress.workers)), epoch_,
-      farm.to_json(progress.fleets, progress.listen));
+      progress.total, json_text(workers_json(progress.workers)), epoch_, farm_json(farm, progress));
 }
 
 Result<std::optional<Checkpoint>> RunStore::checkpoint(

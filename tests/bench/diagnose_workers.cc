@@ -48,9 +48,6 @@ class TimedFarm : public Farm {
     return results;
   }
 
-  std::vector<WorkerStatus> workers() const override { return {}; }
-  std::uint64_t retries() const override { return 0; }
-
   // CPU time of each task, batch by batch.
   const std::vector<std::vector<double>>& batches() const { return batches_; }
 

@@ -28,7 +28,7 @@ TEST(FarmFailures, ATaskThatHangsIsKilledRetriedAndGivenUp) {
   auto tasks = echo_tasks(50);
   tasks[20].mutable_echo()->set_payload("hang");
   expect_given_up((*farm)->run("", tasks), 20, "hung");
-  EXPECT_GE((*farm)->counts().hung, 3u);  // a copy may hang, too
+  EXPECT_GE((*farm)->tally().hung, 3u);  // a copy may hang, too
   ASSERT_THAT((*farm)->quarantine_reasons(), SizeIs(1));
   EXPECT_THAT((*farm)->quarantine_reasons()[0], HasSubstr("echo of 'hang'"));
 }
@@ -44,7 +44,7 @@ TEST(FarmFailures, ARemoteWorkersOwnSupervisorDoesTheSame) {
     expect_given_up((*farm)->run("", tasks), 5,
                     std::string(payload) == "hang" ? "hung" : "crashed");
   }
-  EXPECT_EQ((*farm)->counts().quarantined, 2u);
+  EXPECT_EQ((*farm)->given_up(), 2u);
 }
 
 TEST(FarmFailures, AStoppedWorkerIsReplacedAndNoTaskBlamed) {
@@ -62,7 +62,7 @@ TEST(FarmFailures, AStoppedWorkerIsReplacedAndNoTaskBlamed) {
   });
   expect_echoes(results, tasks);
   ASSERT_TRUE(stopped);
-  EXPECT_EQ((*farm)->counts().quarantined, 0u);
+  EXPECT_EQ((*farm)->given_up(), 0u);
 }
 
 TEST(FarmFailures, ACopyOvertakesTheWorkerThatIsStuck) {
@@ -80,7 +80,7 @@ TEST(FarmFailures, ACopyOvertakesTheWorkerThatIsStuck) {
     kill(stopped, SIGSTOP);
   });
   expect_echoes(results, tasks);
-  EXPECT_GE((*farm)->copied(), 1u);
+  EXPECT_GE((*farm)->tally().copies, 1u);
   kill(stopped, SIGCONT);
 }
 
@@ -93,8 +93,8 @@ TEST(FarmFailures, AuditsAgreeOnHonestMachines) {
     const auto tasks = echo_tasks(100, 500);
     expect_echoes((*farm)->run("", tasks), tasks);
   }
-  EXPECT_GT((*farm)->compared(), 50u);
-  EXPECT_EQ((*farm)->counts().disagreements, 0u);
+  EXPECT_GT((*farm)->tally().compared, 50u);
+  EXPECT_EQ((*farm)->tally().alarms, 0u);
 }
 
 TEST(FarmFailures, DrainingFinishesWhatIsInHand) {
@@ -116,7 +116,7 @@ TEST(FarmFailures, DrainingFinishesWhatIsInHand) {
                              }),
                 tasks);
   EXPECT_EQ(left, 1);
-  EXPECT_EQ((*farm)->counts().late, 0u);
+  EXPECT_EQ((*farm)->tally().late, 0u);
   EXPECT_TRUE(drained->wait_all(20));
 }
 
@@ -165,7 +165,7 @@ TEST(FarmFailures, FinishedWorkIsHandedToTheNextMaster) {
   auto second = SocketFarm::create(options);
   ASSERT_TRUE(second.ok()) << second.error().message;
   expect_echoes((*second)->run("", tasks), tasks);
-  EXPECT_GE((*second)->counts().offered, 1u);
+  EXPECT_GE((*second)->tally().handed_over, 1u);
 }
 
 }  // namespace gapfarm::farm_failures_test

@@ -26,7 +26,7 @@ TEST_P(LocalFarm, AnswersInOrderBatchAfterBatch) {
     const auto tasks = echo_tasks(count, 200);
     expect_echoes((*farm)->run("", tasks), tasks);
   }
-  EXPECT_EQ((*farm)->retries(), 0u);
+  EXPECT_EQ((*farm)->tally().retries, 0u);
   EXPECT_EQ((*farm)->numeric_class(), "fake");
 }
 
@@ -45,7 +45,7 @@ TEST(Farm, SurvivesKillNineInTheMiddleOfABatch) {
                              }),
                 tasks);
   EXPECT_EQ(killed, 3);
-  EXPECT_GE((*farm)->retries(), 1u);  // some may have been killed empty-handed
+  EXPECT_GE((*farm)->tally().retries, 1u);  // some may have been killed empty-handed
 }
 
 TEST(Farm, QuarantinesATaskThatCrashesItsWorkers) {
@@ -216,7 +216,7 @@ TEST(Farm, GarbageDoesNotDisturb) {
                 tasks);
   close(raw);
   EXPECT_GT(reported, 0u);
-  EXPECT_GT((*farm)->counts().malformed, 0u);
+  EXPECT_GT((*farm)->tally().malformed, 0u);
 }
 
 TEST(Farm, EndpointErrorsReportWhatToDo) {

@@ -24,14 +24,15 @@
 namespace gapfarm {
 namespace {
 
-struct ImportRunsOptions {
+struct ImportOptions {
+  std::string format;
   std::vector<std::string> files;
-  std::string out;  // folder
+  std::string out;  // of runs: a folder
   std::string map;  // TOML; empty: guessed
   bool print_map = false;
+  Outputs outputs;
+  TrialOptions reading;
 };
-
-Result<int> import_runs(const ImportRunsOptions& options, Outputs& outputs, CliContext& context);
 
 namespace fs = std::filesystem;
 
@@ -105,8 +106,9 @@ Status write_files(const std::string& out, const RunFiles& files, const std::str
   return outputs.write_in(out, all);
 }
 
-Result<int> import_runs(const ImportRunsOptions& options, Outputs& outputs, CliContext& context) {
+Result<int> import_runs(ImportOptions& options, CliContext& context) {
   Console& console = context.console;
+  Outputs& outputs = options.outputs;
   for (const std::string& file : options.files) outputs.reads(file);
   if (!options.map.empty()) outputs.reads(options.map);
   ASSIGN_OR_RETURN(const std::vector<Recording> recordings, read_all(options.files));
@@ -153,16 +155,6 @@ constexpr const char* kRuns = "runs";
 
 constexpr ImportFormat kFormats[] = {{"bbautotune", TextFormat::kBbautotune, "srv1"}};
 
-struct ImportOptions {
-  std::string format;
-  std::vector<std::string> files;
-  std::string out;
-  std::string map;
-  bool print_map = false;
-  Outputs outputs;
-  TrialOptions reading;
-};
-
 const ImportFormat* find_format(const std::string& name) {
   for (const ImportFormat& format : kFormats) {
     if (name == format.name) return &format;
@@ -199,10 +191,7 @@ Result<int> run_import(ImportOptions& options, CliContext& context) {
   if (options.out.empty() && !options.print_map) {
     return Error{"--out is missing, expected where to write; --out trials.csv"};
   }
-  if (options.format == kRuns) {
-    return import_runs({options.files, options.out, options.map, options.print_map},
-                       options.outputs, context);
-  }
+  if (options.format == kRuns) return import_runs(options, context);
   const bool to_stdout = options.out == "-";
   ASSIGN_OR_RETURN(const TrialLog log, read_logs(options));
   show_notes(log, console);

@@ -25,9 +25,8 @@ struct BlindCheckOptions {
   std::string config;
   std::string out;
   std::string foreign, truth, like, model, key;
-  std::vector<std::string> effects;
+  DesignSettings design;
   std::vector<std::string> sizes = {"clear", "subtle"};
-  unsigned nulls = 60, pairs = 19, excluded = 19, per_effect = 1;
   std::optional<unsigned> trials, workers, jobs;
   std::optional<std::uint64_t> seed;
   double time_limit_s = 1800;
@@ -35,17 +34,12 @@ struct BlindCheckOptions {
 };
 
 Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
-  RETURN_IF_ERROR(check_effects(config.problem.table(), options.effects));
-  DesignSettings design;
-  design.effects = options.effects;
+  DesignSettings design = options.design;
+  RETURN_IF_ERROR(check_effects(config.problem.table(), design.effects));
   for (const std::string& word : options.sizes) {
     ASSIGN_OR_RETURN(const SizeLevel level, size_level(word));
     design.sizes.push_back(level);
   }
-  design.per_effect = options.per_effect;
-  design.nulls = options.nulls;
-  design.pairs = options.pairs;
-  design.excluded = options.excluded;
   design.seed = config.seed;
   return design;
 }
@@ -144,15 +138,15 @@ Result<int> show_strengths(const BlindCheckOptions& options, const Config& confi
   context.console.result(std::to_string(trials) +
                              " trials a case.  A case of every effect and size, with the strength "
                              "that this experiment takes:\n\n" +
-                             table + "\nBeside these " + std::to_string(options.nulls) +
-                             " nulls, " + std::to_string(options.pairs) + " pairs and " +
-                             std::to_string(options.excluded) +
+                             table + "\nBeside these " + std::to_string(options.design.nulls) +
+                             " nulls, " + std::to_string(options.design.pairs) + " pairs and " +
+                             std::to_string(options.design.excluded) +
                              " effects excluded from the catalogue.\n",
                          {{"trials", trials},
                           {"design", table},
-                          {"nulls", options.nulls},
-                          {"pairs", options.pairs},
-                          {"left_out", options.excluded}});
+                          {"nulls", options.design.nulls},
+                          {"pairs", options.design.pairs},
+                          {"left_out", options.design.excluded}});
   return kExitDone;
 }
 
@@ -161,13 +155,14 @@ Result<int> print_check(const BlindCheckOptions& options, const Config& config,
   FarmOptions farm;
   const DiagnoseSettings diagnose = diagnose_of(options);
   farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
-  const std::string cases = options.foreign.empty()
-                                ? "cases of effects, " + std::to_string(options.nulls) +
-                                      " nulls and " + std::to_string(options.pairs) + " pairs"
-                                : "the cases of " + options.foreign;
-  return print_dry_run("diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
-                       {{"out", options.out}, {"nulls", options.nulls}, {"pairs", options.pairs}},
-                       farm, config.farm, context);
+  const std::string cases =
+      options.foreign.empty() ? "cases of effects, " + std::to_string(options.design.nulls) +
+                                    " nulls and " + std::to_string(options.design.pairs) + " pairs"
+                              : "the cases of " + options.foreign;
+  return print_dry_run(
+      "diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
+      {{"out", options.out}, {"nulls", options.design.nulls}, {"pairs", options.design.pairs}},
+      farm, config.farm, context);
 }
 
 // All that makes the cases and what is asked of them; not how many workers do it.
@@ -177,12 +172,12 @@ std::string asked(const BlindCheckOptions& options, const std::string& config_te
   for (const std::string& word : {options.foreign, options.truth, options.like, options.model}) {
     add(word);
   }
-  for (const auto* lists : {&options.effects, &options.sizes}) {
+  for (const auto* lists : {&options.design.effects, &options.sizes}) {
     for (const std::string& word : *lists) add(word);
     add("");
   }
-  for (const unsigned n : {options.nulls, options.pairs, options.excluded, options.per_effect,
-                           options.trials.value_or(0)}) {
+  for (const unsigned n : {options.design.nulls, options.design.pairs, options.design.excluded,
+                           options.design.per_effect, options.trials.value_or(0)}) {
     add(std::to_string(n));
   }
   add(options.seed ? std::to_string(*options.seed) : "");
@@ -225,15 +220,15 @@ Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
 }
 
 void declare_cases(CLI::App& app, BlindCheckOptions& options) {
-  app.add_option("--effects", options.effects, "Only these effects of the catalogue");
+  app.add_option("--effects", options.design.effects, "Only these effects of the catalogue");
   app.add_option("--sizes", options.sizes,
                  "clear (5), subtle (1.6) or numbers: mean squared shift of the end poses in units "
                  "of their spread; 1 is nothing")
       ->delimiter(',');
-  app.add_option("--per-effect", options.per_effect, "Cases an effect and size");
-  app.add_option("--nulls", options.nulls, "Cases without any effect");
-  app.add_option("--pairs", options.pairs, "Cases with two effects");
-  app.add_option("--left-out", options.excluded,
+  app.add_option("--per-effect", options.design.per_effect, "Cases an effect and size");
+  app.add_option("--nulls", options.design.nulls, "Cases without any effect");
+  app.add_option("--pairs", options.design.pairs, "Cases with two effects");
+  app.add_option("--left-out", options.design.excluded,
                  "Cases whose effect, and what passes for it, the diagnosis has to do without");
   app.add_option("--trials", options.trials, "Trials a case (default: as [simulate] says)")
       ->check(CLI::Range(1, 1000000));

@@ -247,7 +247,7 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
   context.console.result(diagnosis_summary(result.diagnosis),
                          diagnosis_summary_json(result.diagnosis, command));
   context.console.note("wrote: " + command.out + "/report.html, diagnosis.json, model.toml");
-  return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+  return asked->given_up() > 0 ? kExitQuarantined : kExitDone;
 }
 
 }  // namespace

@@ -230,7 +230,7 @@ Result<int> run_compare(CompareCommand& command, CliContext& context) {
   context.console.result(comparison_text(summary), to_json(summary));
   context.console.note("wrote: " + (std::filesystem::path(command.out) / "compare.html").string() +
                        ", summary.csv, runs.csv, convergence.csv");
-  return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+  return asked->given_up() > 0 ? kExitQuarantined : kExitDone;
 }
 
 }  // namespace

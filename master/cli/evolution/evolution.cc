@@ -47,13 +47,13 @@ void declare_overrides(EvolutionOverrides& overrides, CLI::App& app) {
       ->check(CLI::Range(2, 1000000, "2+"));
 }
 
-Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config& config,
-                                             const EvolutionOptions& options, Log& log,
-                                             const std::function<void(const FarmEvent&)>& keep,
-                                             CliContext& context) {
+Result<std::unique_ptr<Farm>> open_farm(const RunStore& store, const Config& config,
+                                        const EvolutionOptions& options, Log& log,
+                                        const std::function<void(const FarmEvent&)>& keep,
+                                        CliContext& context) {
   SocketFarmOptions base;
   base.epoch = store.epoch();
-  base.numeric_class = store.info().numeric_class;
+  base.admittance.numeric_class = store.info().numeric_class;
   base.shuffle_seed = options.shuffle;
   report_to(log, base);
   base.on_event = [keep, next = base.on_event](const FarmEvent& event) {
@@ -66,7 +66,7 @@ Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config
       context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
     }
   }
-  return farm_of_run(std::move(farm));
+  return std::unique_ptr<Farm>(std::move(farm));
 }
 
 Result<std::unique_ptr<WorkersBeside>> start_beside(const EvolutionOptions& options,
@@ -84,10 +84,10 @@ void add_validation(const RunSummary& summary, const Problem& problem, std::stri
   if (summary.validated.empty()) return;
   text += fmt::format("validation on {} {} held out, {}:\n", summary.held_out,
                       problem.windows() ? "windows" : "trials", fitness_name(problem.fitness.kind));
-  for (const Validated& row : summary.validated) {
+  for (const ScoreRow& row : summary.validated) {
     text += fmt::format("  {:<24} {}\n", row.name,
-                        row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well");
-    json["validation"].push_back({{"name", row.name}, {"fitness", number_or_null(row.fitness)}});
+                        row.score ? fmt::format("{:.6g}", *row.score) : "does not end well");
+    json["validation"].push_back({{"name", row.name}, {"fitness", number_or_null(row.score)}});
   }
 }
 
@@ -168,7 +168,7 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   OnConsole watcher(context.console);
   std::unique_ptr<PageAlong> page;
   std::unique_ptr<WorkersBeside> beside;
-  const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<FarmOfRun>> {
+  const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<Farm>> {
     ASSIGN_OR_RETURN(auto opened, open_page(options.page, store.run(), context));
     page = std::move(opened);
     auto made = open_farm(store, config, options, log, keep, context);

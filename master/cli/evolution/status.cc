@@ -72,7 +72,7 @@ std::string best_values(const RunStatus& status, const Console& console) {
   return text;
 }
 
-std::string worker_lines(const std::vector<StoredWorker>& workers, const Console& console) {
+std::string worker_lines(const std::vector<WorkerStatus>& workers, const Console& console) {
   std::string text;
   for (std::size_t i = 0; i < workers.size(); ++i) {
     if (i == kMostWorkers) {
@@ -80,7 +80,7 @@ std::string worker_lines(const std::vector<StoredWorker>& workers, const Console
           label(console, "") + "... " + std::to_string(workers.size() - i) + " more with --json\n";
       break;
     }
-    const StoredWorker& worker = workers[i];
+    const WorkerStatus& worker = workers[i];
     text += label(console, i == 0 ? "workers" : "") + printable(worker.name) + " on " +
             printable(worker.host) + ": " + printable(worker.state) + ", " +
             std::to_string(worker.jobs) + " in hand, " + std::to_string(worker.finished) + " done" +
@@ -259,8 +259,8 @@ std::string command_screen(const CommandRecord& record, const std::string& folde
   if (!why.empty()) text += ": " + printable(why);
   text += "\n";
   const bool over = record.state == "finished";
-  if (!over && record.stage_number > 0) {
-    text += label(console, "stage") + std::to_string(record.stage_number) + " of " +
+  if (!over && record.number > 0) {
+    text += label(console, "stage") + std::to_string(record.number) + " of " +
             std::to_string(record.stages) + ": " + printable(record.stage);
     if (record.total > 0) {
       text += ", " + std::to_string(record.done) + " of " + std::to_string(record.total);

@@ -23,8 +23,8 @@ namespace {
 struct CrossfitOptions {
   std::string config;
   TrialOptions trials;
-  std::vector<std::string> only, train, tests, repeats, sweeps, set, genes;
-  std::string by, per;
+  CrossfitPlan plan;
+  std::vector<std::string> only, tests, set, genes;
   std::optional<std::uint64_t> evaluations, seed;
   FarmOptions farm;
   KeepOption keep;
@@ -38,13 +38,8 @@ std::vector<std::string> tokens_of(const std::string& text) {
 }
 
 CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
-  CrossfitPlan plan;
-  plan.train = options.train;
+  CrossfitPlan plan = options.plan;
   for (const std::string& test : options.tests) plan.tests.push_back(tokens_of(test));
-  plan.by = options.by;
-  plan.per = options.per;
-  plan.repeats = options.repeats;
-  plan.sweeps = options.sweeps;
   plan.tuning = {config.evolution, options.seed.value_or(config.seed)};
   if (options.evaluations) plan.tuning.evolution.evaluations = *options.evaluations;
   return plan;
@@ -175,15 +170,16 @@ SubcommandRun setup_crossfit(CLI::App& app) {
   app.add_option("--set", options->set, "PARAMETER=VALUE, effects included; may repeat");
   app.add_option("--genes", options->genes,
                  "KEY or KEY=LOWER,UPPER in place of the config's genes; may repeat");
-  app.add_option("--train", options->train,
+  app.add_option("--train", options->plan.train,
                  "COLUMN=VALUE[,VALUE...] of the trials to tune on; may repeat, all must hold");
   app.add_option("--test", options->tests,
                  "A set of trials to try it on: such filters between blanks; may repeat");
-  app.add_option("--by", options->by, "Tune for each value of this column on its own");
-  app.add_option("--per", options->per, "Show errors by the values of this column");
-  app.add_option("--repeats", options->repeats,
+  app.add_option("--by", options->plan.by, "Tune for each value of this column on its own");
+  app.add_option("--per", options->plan.per, "Show errors by the values of this column");
+  app.add_option("--repeats", options->plan.repeats,
                  "Columns that make a condition: trials alike in them repeat one another");
-  app.add_option("--sweep", options->sweeps, "Vary these parameters alone around what was tuned");
+  app.add_option("--sweep", options->plan.sweeps,
+                 "Vary these parameters alone around what was tuned");
   app.add_option(
       "--evaluations", options->evaluations,
       "Stop each fit after the generation in which so many are reached, in place of the config's");

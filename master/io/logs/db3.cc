@@ -18,11 +18,6 @@ struct Close {
 using Database = std::unique_ptr<sqlite3, Close>;
 using Statement = std::unique_ptr<sqlite3_stmt, Close>;
 
-struct Topic {
-  std::string name, type;
-  std::unique_ptr<MessageSchema> schema;  // null: not read
-};
-
 std::string text_of(sqlite3_stmt* row, int column) {
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
   return text == nullptr ? "" : text;
@@ -59,11 +54,11 @@ class Reader {
     ASSIGN_OR_RETURN(auto rows, prepare("SELECT id, name, type, serialization_format FROM topics"));
     int code = SQLITE_ROW;
     while ((code = sqlite3_step(rows.get())) == SQLITE_ROW) {
-      Topic topic{text_of(rows.get(), 1), text_of(rows.get(), 2), nullptr};
+      BagTopic topic{text_of(rows.get(), 1), text_of(rows.get(), 2)};
       if (serves_ground_robots(topic.type) && text_of(rows.get(), 3) == "cdr") {
         // Another package's type of the same name is left.
         Result<MessageSchema> schema = MessageSchema::known(topic.type);
-        if (schema) topic.schema = std::make_unique<MessageSchema>(*std::move(schema));
+        if (schema) topic.schema = *std::move(schema);
       }
       by_id_.emplace(sqlite3_column_int64(rows.get(), 0), std::move(topic));
     }
@@ -79,20 +74,13 @@ class Reader {
     while ((code = sqlite3_step(rows.get())) == SQLITE_ROW) {
       const auto found = by_id_.find(sqlite3_column_int64(rows.get(), 0));
       if (found == by_id_.end()) return broken();
-      const Topic& topic = found->second;
-      if (topic.schema == nullptr) {
-        topics_.skip(topic.name, topic.type);
-        continue;
-      }
       const sqlite3_int64 ns = sqlite3_column_int64(rows.get(), 1);
       const double t =
           static_cast<double>(ns / 1'000'000'000) + 1e-9 * static_cast<double>(ns % 1'000'000'000);
       const auto* data = static_cast<const char*>(sqlite3_column_blob(rows.get(), 2));
       const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows.get(), 2));
       const std::string_view bytes(data == nullptr ? "" : data, data == nullptr ? 0 : size);
-      if (Status s =
-              topics_.add(topic.name, topic.type, *topic.schema, MessageWire::kCdr, t, bytes);
-          !s) {
+      if (Status s = topics_.add(found->second, t, bytes); !s) {
         return Error{path_ + ":1: message " + text_of(rows.get(), 3) + ": " + s.error().message};
       }
     }
@@ -103,7 +91,7 @@ class Reader {
   const std::string& path_;
   Topics topics_;
   Database database_;
-  std::map<sqlite3_int64, Topic> by_id_;
+  std::map<sqlite3_int64, BagTopic> by_id_;
 };
 
 }  // namespace

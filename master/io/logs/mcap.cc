@@ -1,6 +1,5 @@
 #include <cstring>
 #include <map>
-#include <memory>
 
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
@@ -48,12 +47,6 @@ class Cursor {
 
 struct Schema {
   std::string name, encoding, text;
-};
-
-struct Channel {
-  std::string topic, type;
-  MessageWire wire = MessageWire::kCdr;
-  std::unique_ptr<MessageSchema> schema;  // null: not read
 };
 
 class Reader {
@@ -156,8 +149,8 @@ class Reader {
   Status channel(std::uint64_t at, Cursor& cursor) {
     const auto id = cursor.number<std::uint16_t>();
     const auto schema_id = cursor.number<std::uint16_t>();
-    Channel read;
-    read.topic = cursor.text();
+    BagTopic read;
+    read.name = cursor.text();
     const std::string encoding(cursor.text());
     if (!cursor.good()) return broken(at);
     if (channels_.count(id) != 0) return {};
@@ -172,7 +165,7 @@ class Reader {
         if (!parsed) {
           return error(at, parsed.error().message, "a whole definition of the message", kRecover);
         }
-        read.schema = std::make_unique<MessageSchema>(*std::move(parsed));
+        read.schema = *std::move(parsed);
       }
     }
     if (read.type.empty()) read.type = encoding;
@@ -191,14 +184,9 @@ class Reader {
       return error(at, "a message of channel " + std::to_string(id), "its channel record before it",
                    kRecover);
     }
-    const Channel& c = found->second;
-    if (c.schema == nullptr) {
-      topics_.skip(c.topic, c.type);
-      return {};
-    }
     const double t = static_cast<double>(log_time / 1'000'000'000) +
                      1e-9 * static_cast<double>(log_time % 1'000'000'000);
-    if (Status s = topics_.add(c.topic, c.type, *c.schema, c.wire, t, cursor.rest()); !s) {
+    if (Status s = topics_.add(found->second, t, cursor.rest()); !s) {
       return Error{file_ + ":" + std::to_string(at + 1) + ": " + s.error().message};
     }
     return {};
@@ -208,7 +196,7 @@ class Reader {
   const std::string& file_;
   Topics topics_;
   std::map<std::uint16_t, Schema> schemas_;
-  std::map<std::uint16_t, Channel> channels_;
+  std::map<std::uint16_t, BagTopic> channels_;
   bool nested_ = false;
   bool ended_ = false;
 };

@@ -1,6 +1,5 @@
 #include <cstring>
 #include <map>
-#include <memory>
 
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
@@ -41,11 +40,6 @@ bool parse_header(std::string_view bytes, Header& to) {
   }
   return true;
 }
-
-struct Connection {
-  std::string topic, type;
-  std::unique_ptr<MessageSchema> schema;  // null: not read
-};
 
 class Reader {
  public:
@@ -147,16 +141,11 @@ class Reader {
       return error(begin, "a message of connection " + std::to_string(id),
                    "its connection record before it", kReindex);
     }
-    const Connection& c = found->second;
-    if (c.schema == nullptr) {
-      topics_.skip(c.topic, c.type);
-      return {};
-    }
     const std::string& time = header["time"];
     const double t =
         number<std::uint32_t>(time) + 1e-9 * number<std::uint32_t>(std::string_view(time).substr(
                                                  std::min<std::size_t>(4, time.size())));
-    if (Status s = topics_.add(c.topic, c.type, *c.schema, MessageWire::kRos1, t, data); !s) {
+    if (Status s = topics_.add(found->second, t, data); !s) {
       return Error{file_ + ":" + std::to_string(begin + 1) + ": " + s.error().message};
     }
     return {};
@@ -170,13 +159,13 @@ class Reader {
       return error(begin, "a connection whose header makes no sense", "name=value fields",
                    kReindex);
     }
-    Connection c{topic, header["type"], nullptr};
+    BagTopic c{topic, header["type"], MessageWire::kRos1};
     if (serves_ground_robots(c.type)) {
       Result<MessageSchema> schema = MessageSchema::parse(c.type, header["message_definition"]);
       if (!schema) {
         return error(begin, schema.error().message, "a whole definition of the message", kReindex);
       }
-      c.schema = std::make_unique<MessageSchema>(*std::move(schema));
+      c.schema = *std::move(schema);
     }
     connections_.emplace(id, std::move(c));
     return {};
@@ -186,7 +175,7 @@ class Reader {
   const std::string& file_;
   Topics topics_;
   std::uint64_t at_ = 0;
-  std::map<std::uint32_t, Connection> connections_;
+  std::map<std::uint32_t, BagTopic> connections_;
 };
 
 }  // namespace

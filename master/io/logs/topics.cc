@@ -54,18 +54,18 @@ Status Topics::put(const std::string& topic, const std::string& type, double t_s
   return {};
 }
 
-Status Topics::add(const std::string& topic, const std::string& type, const MessageSchema& schema,
-                   MessageWire wire, double t_s, std::string_view bytes) {
-  Result<MessageContent> content = schema.decode(bytes, wire);
+Status Topics::add(const BagTopic& of, double t_s, std::string_view bytes) {
+  if (!of.schema) return skip(of);
+  const std::string &topic = of.name, &type = of.type;
+  Result<MessageContent> content = of.schema->decode(bytes, of.wire);
   if (!content) return Error{"topic " + quoted_word(topic) + ": " + content.error().message};
   const std::string_view name = std::string_view(type).substr(type.rfind('/') + 1);
   if (name == "String") {
     const auto data = content->texts.find("data");
-    if (data != content->texts.end() && topic.find("robot_description") != topic.npos) {
-      recording_.robot_description = data->second;
-    } else {
-      skip(topic, type);
+    if (data == content->texts.end() || topic.find("robot_description") == topic.npos) {
+      return skip(of);
     }
+    recording_.robot_description = data->second;
     return {};
   }
   if (name == "JointState") {
@@ -93,10 +93,11 @@ Status Topics::add(const std::string& topic, const std::string& type, const Mess
   return {};
 }
 
-void Topics::skip(const std::string& topic, const std::string& type) {
-  auto& [kind, count] = skipped_[topic];
-  kind = type;
+Status Topics::skip(const BagTopic& of) {
+  auto& [kind, count] = skipped_[of.name];
+  kind = of.type;
   ++count;
+  return {};
 }
 
 Recording Topics::finish() {

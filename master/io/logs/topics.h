@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,18 +12,22 @@
 
 namespace gapfarm {
 
+// What a bag says of a topic.
+struct BagTopic {
+  std::string name, type;
+  MessageWire wire = MessageWire::kCdr;
+  std::optional<MessageSchema> schema = {};  // none: its messages are not read
+};
+
 class Topics {
  public:
   Topics(std::string file, std::string format);
 
-  // Keeps the message's numbers in the topic's table, "t" being the time of recording; transforms
-  // go to a table for each child frame, joints' values to columns velocity.NAME.  Types that serve
-  // no robot are counted only.  Errors: a message that is shorter than its type, more numbers than
-  // a log of drives has.
-  Status add(const std::string& topic, const std::string& type, const MessageSchema& schema,
-             MessageWire wire, double t_s, std::string_view bytes);
-  // Counts a message of a topic that is not read.
-  void skip(const std::string& topic, const std::string& type);
+  // Keeps a message's numbers in the topic's table, "t" being the time of recording; transforms
+  // go to a table for each child frame, joints' values to columns velocity.NAME.  Of topics that
+  // are not read, messages are counted only.  Errors: a message that is shorter than its type, more
+  // numbers than a log of drives has.
+  Status add(const BagTopic& of, double t_s, std::string_view bytes);
 
   Recording finish();
 
@@ -33,6 +38,7 @@ class Topics {
     std::vector<std::string> names;
     std::vector<std::vector<std::pair<std::size_t, double>>> rows;
   };
+  Status skip(const BagTopic& of);
   Status put(const std::string& topic, const std::string& type, double t_s,
              const std::vector<std::pair<std::string, double>>& numbers);
 

@@ -21,7 +21,7 @@ constexpr int kVersion = 1;
 
 constexpr auto kScore = [](auto& v, auto& row) {
   FIELDS(name);
-  IF_ANY(score, position_mm, heading_mrad);
+  IF_ANY(score);
 };
 
 constexpr int kRunPlotDigits = 7;
@@ -76,20 +76,11 @@ std::string summary(const RunReport& report) {
 
 std::string score_table(const std::vector<ScoreRow>& rows, const std::string& column,
                         const char* file) {
-  const bool errors = std::ranges::any_of(
-      rows, [](const ScoreRow& row) { return row.position_mm || row.heading_mrad; });
-  std::vector<HtmlColumn> columns = {{""}, {html_escaped(column), "number", "score"}};
-  if (errors)
-    columns.insert(columns.end(), {{"position, mm", "number"}, {"heading, mrad", "number"}});
   std::vector<HtmlRow> lines;
   for (const ScoreRow& row : rows) {
-    lines.push_back({html_escaped(row.name), {}});
-    for (const auto& value : {row.score, row.position_mm, row.heading_mrad}) {
-      if (lines.back().cells.size() + 1 == columns.size()) break;
-      lines.back().cells.push_back(value ? number_text(*value, 5) : "–");
-    }
+    lines.push_back({html_escaped(row.name), {row.score ? number_text(*row.score, 5) : "–"}});
   }
-  return html_table("parts", file, file, columns, lines);
+  return html_table("parts", file, file, {{""}, {html_escaped(column), "number", "score"}}, lines);
 }
 
 std::string fitness_names(const RunReport& report) {

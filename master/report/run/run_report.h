@@ -11,6 +11,7 @@
 
 #include "common/base/result.h"
 #include "master/diagnose/result/diagnosis.h"
+#include "master/store/run_reader.h"
 
 namespace gapfarm {
 
@@ -31,9 +32,8 @@ struct RunGeneration {
 
 // How well something predicts trials.
 struct ScoreRow {
-  std::string name;
-  std::optional<double> score;  // in the run's fitness, or nats a trial
-  std::optional<double> position_mm, heading_mrad;
+  std::string name;             // "the config's own values", "after stage 1", "the best"
+  std::optional<double> score;  // in the run's fitness, or nats a trial; none: it did not end well
 };
 
 // What is worked out once, when evolution ends, and kept in the run store.
@@ -55,11 +55,7 @@ struct GeneDensity {
   std::vector<double> best;                   // of those generations
 };
 
-struct RunWorker {
-  std::string name, host, state;
-  unsigned jobs = 0;
-  std::uint64_t finished = 0;
-  double rate_per_s = 0;
+struct RunWorker : WorkerStatus {
   std::string failure;  // the last of this name, with its time; empty: none
 };
 
@@ -87,23 +83,6 @@ struct RunElite {
   };
   std::vector<Axis> axes;
   std::vector<Line> lines;
-};
-
-// Of several objectives, each in its own sense: what a search trades off.
-struct RunFrontView {
-  struct Objective {
-    std::string name;
-    bool maximise = false;
-  };
-  struct Member {
-    std::uint64_t birth_id = 0;
-    std::vector<double> values;
-  };
-  std::vector<Objective> objectives;  // empty: the run has one fitness
-  std::vector<Member> members;        // of the last generation's front
-  std::size_t knee = 0;
-  std::vector<double> reference;                              // of the hypervolume
-  std::vector<std::pair<std::uint64_t, double>> hypervolume;  // by generation
 };
 
 // What the evaluations say of the genes.
@@ -188,7 +167,7 @@ struct RunReport {
   std::optional<RunGenome> looked_up;  // the one that was asked for
   std::string without_looked_up;       // why there is none, when one was asked for
   RunElite elite;
-  RunFrontView front;
+  RunFront front;
   RunSample sample;
   RunFarm farm;
   std::size_t trials = 0;    // of the log

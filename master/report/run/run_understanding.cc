@@ -4,12 +4,15 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 #include "master/report/run/run_live.h"
 
 namespace gapfarm {
 namespace {
+
+constexpr std::size_t kMostVolumes = 1000;
 
 // What a plot can show of it.
 Json short_list(const std::vector<double>& values, int digits) {
@@ -52,15 +55,23 @@ std::string understanding_section(const RunReport& report) {
 }
 
 Json front_json(const RunReport& report) {
-  const RunFrontView& front = report.front;
+  const RunFront& front = report.front;
   Json objectives = Json::array(), members = Json::array(), volumes = Json::array();
   for (const auto& [name, maximise] : front.objectives) {
     objectives.push_back({{"name", name}, {"maximise", maximise}});
   }
-  for (const auto& [birth_id, values] : front.members) {
-    members.push_back({{"id", birth_id}, {"values", short_list(values, 7)}});
+  for (const StoredIndividual& member : front.members) {
+    const auto values = mapped(member.objectives, &NamedValue::second);
+    members.push_back({{"id", member.birth_id}, {"values", short_list(values, 7)}});
   }
-  for (const auto& [generation, volume] : front.hypervolume) {
+  std::vector<std::pair<std::uint64_t, double>> known;
+  for (std::size_t i = 0; i < front.hypervolume.size(); ++i) {
+    if (front.hypervolume[i]) {
+      known.emplace_back(report.generations[i].generation, *front.hypervolume[i]);
+    }
+  }
+  for (const auto& [generation, volume] :
+       decimated(known, kMostVolumes, [](const auto& at) { return at.second; })) {
     volumes.push_back({generation, short_list({volume}, 7)[0]});
   }
   return {{"objectives", std::move(objectives)},

@@ -18,8 +18,6 @@ class WorkerFarm : public Farm {
   Result<std::vector<v1::TaskResult>> run(
       const std::string& problem_hash, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>& on_progress = {}) override;
-  std::vector<WorkerStatus> workers() const override { return {}; }
-  std::uint64_t retries() const override { return 0; }
 
  private:
   std::map<std::string, std::unique_ptr<PreparedProblem>> problems_;

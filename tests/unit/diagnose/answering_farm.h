@@ -28,9 +28,6 @@ class AnsweringFarm : public Farm {
     return results;
   }
 
-  std::vector<WorkerStatus> workers() const override { return {}; }
-  std::uint64_t retries() const override { return 0; }
-
   std::size_t asked = 0;
 
  private:

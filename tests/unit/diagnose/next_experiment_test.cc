@@ -35,8 +35,6 @@ class FakeFarm : public Farm {
     for (const v1::Task& task : tasks) results.push_back(answer(task.predict()));
     return results;
   }
-  std::vector<WorkerStatus> workers() const override { return {}; }
-  std::uint64_t retries() const override { return 0; }
 
   bool broken = false;
   double diverges_above = 1e9;

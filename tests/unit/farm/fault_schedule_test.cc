@@ -68,7 +68,7 @@ std::string trouble_of(std::uint64_t seed) {
     return std::to_string(farm.answers_taken()) + " answers were taken for " +
            std::to_string(last) + " tasks";
   }
-  if (farm.scheduler().counts().disagreements != 0) return "a false alarm";
+  if (farm.scheduler().tally().alarms != 0) return "a false alarm";
   return "";
 }
 
@@ -101,7 +101,7 @@ std::string trouble_of_stream(std::uint64_t seed) {
   const auto first = tasks.begin() + static_cast<std::ptrdiff_t>(next);
   if (!farm.stream({tasks.begin(), first}, take)) return "did not end";
   if (answers != std::vector<unsigned>(kTasks, 1)) return "not one answer a task";
-  if (farm.scheduler().counts().disagreements != 0) return "a false alarm";
+  if (farm.scheduler().tally().alarms != 0) return "a false alarm";
   return trouble;
 }
 
@@ -133,9 +133,9 @@ TEST(FaultSchedules, TheUndisturbedOneRetriesNothing) {
   SimulatedFarm farm(1, 3, none);
   const auto tasks = tasks_for(3, false);
   ASSERT_EQ(farm.run(tasks).size(), tasks.size());
-  EXPECT_EQ(farm.scheduler().counts().retries, 0u);
-  EXPECT_EQ(farm.scheduler().counts().late, 0u);
-  EXPECT_EQ(farm.scheduler().counts().foreign, 0u);
+  EXPECT_EQ(farm.scheduler().tally().retries, 0u);
+  EXPECT_EQ(farm.scheduler().tally().late, 0u);
+  EXPECT_EQ(farm.scheduler().tally().foreign, 0u);
 }
 
 // Two workers, tasks of a millisecond, ten milliseconds there and back: whatever the way takes, it
@@ -154,7 +154,7 @@ TEST(FaultSchedules, TheWindowGrowsWithTheWayToTheMaster) {
   const double began = farm.now();
   ASSERT_EQ(farm.run(tasks).size(), tasks.size());
   EXPECT_LT(farm.now() - began, 1.2 * 4.0) << "4 s is what two workers take that never wait";
-  EXPECT_LT(farm.scheduler().copied(), 80u) << "a hundredth";
+  EXPECT_LT(farm.scheduler().tally().copies, 80u) << "a hundredth";
 }
 
 TEST(FaultSchedules, AuditsFindTheMachineThatComputesWrongly) {

@@ -128,7 +128,7 @@ TEST_F(FleetMessages, AReportWithoutANameIsRefused) {
   v1::Envelope envelope;
   envelope.mutable_fleet();
   scheduler_.on_message("manager", &envelope, 0);
-  EXPECT_EQ(scheduler_.counts().malformed, 1u);
+  EXPECT_EQ(scheduler_.tally().malformed, 1u);
   EXPECT_TRUE(scheduler_.outbox().empty());
 }
 

@@ -50,6 +50,19 @@ class Desk {
   }
   void join(const std::string& name) { send_hello(name, hello(name)); }
 
+  // The process of `name` is gone, with this attempt in work.
+  void end(const std::string& name, EndCause cause, std::uint64_t attempt, const std::string& text,
+           const std::string& failure = "") {
+    ProcessEnded end;
+    end.name = name;
+    end.cause = cause;
+    end.epoch = 7;
+    end.attempt = attempt;
+    end.text = text;
+    end.failure = failure;
+    scheduler.on_process_end(end);
+  }
+
   void answer(const std::string& peer, const v1::Job& job, std::uint64_t epoch = 7,
               v1::Outcome outcome = v1::OK) {
     v1::Envelope envelope;
@@ -158,7 +171,7 @@ TEST(Scheduler, GivesASilentWorkersJobsToOthersWithoutBlame) {
     desk.scheduler.on_tick(desk.now);
   }
   EXPECT_TRUE(desk.reported(FarmEvent::kSilent));
-  EXPECT_EQ(desk.scheduler.counts().retries, 2u);
+  EXPECT_EQ(desk.scheduler.tally().retries, 2u);
   EXPECT_EQ(desk.scheduler.worker_status().at(0).name, "b");
   EXPECT_EQ(desk.scheduler.worker_status().at(0).jobs, 2u);
   // It was only cut off: unknown by now, it is asked who it is, and its answers do not count.
@@ -201,11 +214,11 @@ TEST(Scheduler, TakesNoAnswerTwiceNorFromAnotherEpochOrWorker) {
   wrong.set_attempt_id(job.attempt_id() + 1000);
   desk.answer(owner, wrong);
   desk.answer(owner, job, 7, v1::OUTCOME_UNSPECIFIED);
-  EXPECT_EQ(desk.scheduler.counts().foreign, 5u);
+  EXPECT_EQ(desk.scheduler.tally().foreign, 5u);
   EXPECT_FALSE(desk.scheduler.finished());
   desk.answer(owner, job, 7, v1::INVALID_REQUEST);
   desk.answer(owner, job);
-  EXPECT_EQ(desk.scheduler.counts().late, 1u);
+  EXPECT_EQ(desk.scheduler.tally().late, 1u);
   EXPECT_EQ(desk.scheduler.finish()[0].outcome(), v1::INVALID_REQUEST);
   desk.scheduler.start("", echo_tasks(1));
   desk.answer(owner, job);
@@ -248,7 +261,7 @@ TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
         for (const v1::Job& job : jobs) {
           if (job.task().echo().payload() == "1") culprit = job.attempt_id();
         }
-        desk.scheduler.on_process_end({name, EndCause::kCrashed, 7, culprit, "signal 11"});
+        desk.end(name, EndCause::kCrashed, culprit, "signal 11");
         break;
       }
       for (const v1::Job& job : jobs) desk.answer(name, job);
@@ -256,7 +269,7 @@ TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
   }
   ASSERT_TRUE(desk.scheduler.finished());
   EXPECT_TRUE(desk.reported(FarmEvent::kQuarantined));
-  EXPECT_EQ(desk.scheduler.counts().quarantined, 1u);
+  EXPECT_EQ(desk.scheduler.given_up(), 1u);
   const auto results = desk.scheduler.finish();
   EXPECT_EQ(results[0].outcome(), v1::OK);
   EXPECT_EQ(results[1].outcome(), v1::WORKER_FAILED);
@@ -279,8 +292,8 @@ TEST(Scheduler, ReportsWhatFailedAtWhichValuesAndHowToRepeatIt) {
     const auto jobs = desk.jobs_for(name);
     ASSERT_EQ(jobs.size(), 1u) << name;
     const bool first = std::string(name) == "a";
-    desk.scheduler.on_process_end({name, EndCause::kCrashed, 7, jobs[0].attempt_id(), "ended",
-                                   first ? "" : "it did not answer within 1 s\nby hand: ask it"});
+    desk.end(name, EndCause::kCrashed, jobs[0].attempt_id(), "ended",
+             first ? "" : "it did not answer within 1 s\nby hand: ask it");
   }
   const std::string text = desk.scheduler.quarantine_reasons().back();
   EXPECT_EQ(desk.events.back().text, text);
@@ -300,10 +313,10 @@ TEST(Scheduler, NeverBlamesAJobForPoliteExits) {
     v1::Envelope goodbye;
     goodbye.mutable_goodbye();
     desk.send(name, goodbye);
-    desk.scheduler.on_process_end({name, EndCause::kLeft, 7, 0, "exited with status 0"});
+    desk.end(name, EndCause::kLeft, 0, "exited with status 0");
   }
   EXPECT_FALSE(desk.scheduler.finished());
-  EXPECT_EQ(desk.scheduler.counts().quarantined, 0u);
+  EXPECT_EQ(desk.scheduler.given_up(), 0u);
 }
 
 TEST(Scheduler, AReturningWorkerKeepsWhatItStillHolds) {

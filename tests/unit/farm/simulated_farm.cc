@@ -151,7 +151,7 @@ void SimulatedFarm::start_master() {
   if (!master_end_) master_end_ = std::make_unique<MasterEnd>(*this);
 }
 
-void SimulatedFarm::start_worker(unsigned place, const WorkerEnd& replaced) {
+void SimulatedFarm::start_worker(unsigned place, const ProcessEnded& replaced) {
   auto worker = std::make_shared<Worker>();
   worker->name = "worker-" + std::to_string(++names_);
   worker->peer = "peer-" + std::to_string(names_);
@@ -183,7 +183,10 @@ void SimulatedFarm::start_worker(unsigned place, const WorkerEnd& replaced) {
 void SimulatedFarm::end_worker(const std::shared_ptr<Worker>& worker, EndCause cause) {
   worker->alive = false;
   by_peer_.erase(worker->peer);
-  WorkerEnd end{worker->name, cause, 0, 0, "ended"};
+  ProcessEnded end;
+  end.name = worker->name;
+  end.cause = cause;
+  end.text = "ended";
   if (worker->evaluating) {
     end.epoch = worker->queue.front().job.epoch();
     end.attempt = worker->queue.front().job.attempt_id();
@@ -192,8 +195,9 @@ void SimulatedFarm::end_worker(const std::shared_ptr<Worker>& worker, EndCause c
   if (local) at(now_ + uniform(0, 0.1), [this, end] { scheduler_->on_process_end(end); });
   const bool own_doing = cause == EndCause::kCrashed || cause == EndCause::kHung;
   const bool reported = !local && (own_doing || chance(0.5));
-  at(now_ + uniform(0, 0.5),
-     [this, worker, reported, end] { start_worker(worker->place, reported ? end : WorkerEnd{}); });
+  at(now_ + uniform(0, 0.5), [this, worker, reported, end] {
+    start_worker(worker->place, reported ? end : ProcessEnded{});
+  });
 }
 
 void SimulatedFarm::step_master() {
@@ -348,8 +352,7 @@ std::vector<v1::TaskResult> SimulatedFarm::run(const std::vector<v1::Task>& task
 }
 
 std::uint64_t SimulatedFarm::taken() const {
-  const SchedulerCounts& counts = scheduler_->counts();
-  std::uint64_t taken = counts.offered + counts.quarantined;
+  std::uint64_t taken = scheduler_->tally().handed_over + scheduler_->given_up();
   for (const WorkerStatus& status : scheduler_->worker_status()) taken += status.finished;
   return taken;
 }

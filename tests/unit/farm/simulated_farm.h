@@ -74,7 +74,7 @@ class SimulatedFarm {
   void carry(const std::function<void()>& deliver);
   void plan_faults(const FaultPlan& faults);
   void start_master();
-  void start_worker(unsigned place, const WorkerEnd& replaced);
+  void start_worker(unsigned place, const ProcessEnded& replaced);
   void end_worker(const std::shared_ptr<Worker>& worker, EndCause cause);
   void drop_work(Worker& worker);
   bool leaves(const std::shared_ptr<Worker>& worker);

@@ -27,8 +27,8 @@ RunReport example_run() {
   run.parameters = example_diagnosis().parameters;
   run.outcome.emplace();
   run.outcome->trials = example_diagnosis().trials;
-  run.outcome->validation = {{"the config's own values", 3.2, {}, {}}, {"the best", 9.4, {}, {}}};
-  run.outcome->baselines = {{"constant motion", 6.695, 66.1, 103}};
+  run.outcome->validation = {{"the config's own values", 3.2}, {"the best", 9.4}};
+  run.outcome->baselines = {{"constant motion", 6.695}};
   return run;
 }
 

@@ -200,8 +200,8 @@ TEST(RunHtml, KeepsWhatItWasGiven) {
   RunOutcome outcome;
   outcome.trials = null_diagnosis().trials;
   outcome.trials[3].tuned_residual.setConstant(std::nan(""));
-  outcome.validation = {{"the best", 9.5, {}, {}}, {"after stage 1", {}, {}, {}}};
-  outcome.baselines = {{"constant motion", 6.695, 20, 30}};
+  outcome.validation = {{"the best", 9.5}, {"after stage 1", {}}};
+  outcome.baselines = {{"constant motion", 6.695}};
   const auto back = parse_run_outcome(to_json(outcome));
   ASSERT_TRUE(back.ok()) << back.error().message;
   EXPECT_EQ(to_json(*back), to_json(outcome));

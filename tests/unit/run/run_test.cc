@@ -22,7 +22,7 @@ using testing::SizeIs;
 constexpr std::uint64_t kGenerations = 3;
 
 // A worker; what it is asked is counted, and something may go wrong at a batch of tasks.
-class ShakyFarm : public tests::WorkerFarm, public FarmOfRun {
+class ShakyFarm : public tests::WorkerFarm {
  public:
   struct Faults {
     std::size_t no_worker_at = 0;  // batch, from 1; 0: none
@@ -44,11 +44,8 @@ class ShakyFarm : public tests::WorkerFarm, public FarmOfRun {
     return results;
   }
 
-  Farm& farm() override { return *this; }
-  FarmTally tally() const override { return {}; }
   std::uint64_t given_up() const override { return given_up_; }
   std::string numeric_class() const override { return "here"; }
-  std::vector<std::string> endpoints() const override { return {}; }
 
  private:
   Faults faults_;
@@ -102,8 +99,8 @@ class RunTest : public testing::Test {
                         std::size_t stop_after = 1000) {
     Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
     std::size_t batches = 0;
-    const auto open = [&](const auto&) -> Result<std::unique_ptr<FarmOfRun>> {
-      return std::unique_ptr<FarmOfRun>(std::make_unique<ShakyFarm>(faults, &batches));
+    const auto open = [&](const auto&) -> Result<std::unique_ptr<Farm>> {
+      return std::unique_ptr<Farm>(std::make_unique<ShakyFarm>(faults, &batches));
     };
     return evolve_run(store,
                       {config, config.problem, log, open, [&] { return batches >= stop_after; }},
@@ -211,7 +208,7 @@ TEST_F(RunTest, ReportsInItsStoreThatNoFarmCouldBeOpened) {
   const Config asked = config();
   RunStore store = begin(asked);
   Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
-  const auto open = [](const auto&) -> Result<std::unique_ptr<FarmOfRun>> {
+  const auto open = [](const auto&) -> Result<std::unique_ptr<Farm>> {
     return Error{"the port is taken"};
   };
   ASSERT_FALSE(evolve_run(store, {asked, asked.problem, log, open, {}}, listener_).ok());
@@ -232,7 +229,7 @@ TEST_F(RunTest, OpensNoFarmForTrialsHeldOutThatAreNotThere) {
   const Config asked = config("[validation]\ntrials = [\"gone.csv\"]\n");
   RunStore store = begin(asked);
   Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
-  const auto open = [](const auto&) -> Result<std::unique_ptr<FarmOfRun>> {
+  const auto open = [](const auto&) -> Result<std::unique_ptr<Farm>> {
     ADD_FAILURE() << "a farm was opened";
     return Error{"none"};
   };
@@ -250,7 +247,7 @@ TEST_F(RunTest, HoldsItsBestAgainstTrialsHeldOut) {
   const RunSummary summary = go(store, asked).value();
   EXPECT_EQ(summary.held_out, listener_.apart);
   std::vector<std::string> names;
-  for (const Validated& row : summary.validated) names.push_back(row.name);
+  for (const ScoreRow& row : summary.validated) names.push_back(row.name);
   EXPECT_THAT(names, ElementsAre("the config's own values", "the best"));
 }
 

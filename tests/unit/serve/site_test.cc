@@ -146,7 +146,7 @@ TEST_F(SiteTest, ADiagnosisAtWorkReportsWhatItHasFound) {
   record.command = "diagnose";
   record.state = "stopped";
   record.stage = "screen";
-  record.stage_number = 2, record.stages = 3;
+  record.number = 2, record.stages = 3;
   record.plan = {{"tune", 1e9 - 40}, {"screen", 1e9 - 30}, {"refit", 0}};
   record.heartbeat_unix_s = 1e9 - 5;
   record.findings = {

@@ -17,7 +17,7 @@ v1::Task echo(const std::string& payload) {
 }
 
 // Answers with the payload, counts what it is asked, and stops when reported to.
-class EchoFarm : public Farm, public AnswerSource {
+class EchoFarm : public Farm {
  public:
   std::string add_problem(const v1::Problem&) override { return "hash"; }
   void watch_answers(AnswerWatcher watcher) override { watcher_ = std::move(watcher); }
@@ -36,8 +36,6 @@ class EchoFarm : public Farm, public AnswerSource {
     }
     return results;
   }
-  std::vector<WorkerStatus> workers() const override { return {}; }
-  std::uint64_t retries() const override { return 0; }
 
   std::vector<std::string> asked;
   bool stopped = false;
@@ -53,11 +51,11 @@ class AnswerStoreTest : public StoreTest {
 };
 
 TEST_F(AnswerStoreTest, AFarmIsAskedOnlyOnceAndAnswersKeepTheirOrder) {
-  EchoFarm farm;
+  const auto farm = std::make_shared<EchoFarm>();
   for (const bool again : {false, true}) {
     auto store = AnswerStore::open(answers(), "build");
     ASSERT_TRUE(store.ok()) << store.error().message;
-    RecordedFarm recorded(farm, *store, &farm);
+    RecordedFarm recorded(farm, &*store);
     const std::string hash = recorded.add_problem({});
     const auto first = recorded.run(hash, {echo("a"), echo("b")});
     ASSERT_TRUE(first.ok());
@@ -69,17 +67,17 @@ TEST_F(AnswerStoreTest, AFarmIsAskedOnlyOnceAndAnswersKeepTheirOrder) {
     EXPECT_EQ(recorded.simulated(), again ? 0u : 3u);
     EXPECT_EQ(recorded.remembered(), again ? 5u : 2u);
   }
-  EXPECT_THAT(farm.asked, testing::ElementsAre("a", "b", "c"));
+  EXPECT_THAT(farm->asked, testing::ElementsAre("a", "b", "c"));
 }
 
 TEST_F(AnswerStoreTest, AStopLosesNothingThatWasAnswered) {
-  EchoFarm farm;
+  const auto farm = std::make_shared<EchoFarm>();
   auto store = AnswerStore::open(answers(), "build");
   ASSERT_TRUE(store.ok());
-  RecordedFarm recorded(farm, *store, &farm);
+  RecordedFarm recorded(farm, &*store);
   const std::string hash = recorded.add_problem({});
   ASSERT_TRUE(recorded.run(hash, {echo("a")}).ok());
-  farm.stopped = true;
+  farm->stopped = true;
   const auto stopped = recorded.run(hash, {echo("a"), echo("b")});
   ASSERT_FALSE(stopped.ok());
   EXPECT_EQ(stopped.error().code, ErrorCode::kStopped);
@@ -88,24 +86,24 @@ TEST_F(AnswerStoreTest, AStopLosesNothingThatWasAnswered) {
 
 // One batch may be the whole of a command's work.
 TEST_F(AnswerStoreTest, AStopWithinABatchLosesNothingThatWasAnswered) {
-  EchoFarm farm;
+  const auto farm = std::make_shared<EchoFarm>();
   auto store = AnswerStore::open(answers(), "build");
   ASSERT_TRUE(store.ok());
-  farm.stop_at = "c";
+  farm->stop_at = "c";
   {
-    RecordedFarm recorded(farm, *store, &farm);
+    RecordedFarm recorded(farm, &*store);
     const auto stopped = recorded.run(recorded.add_problem({}), {echo("a"), echo("b"), echo("c")});
     ASSERT_FALSE(stopped.ok());
     EXPECT_EQ(*store->count(), 2);
   }
-  farm.stop_at.clear();
-  RecordedFarm recorded(farm, *store, &farm);
+  farm->stop_at.clear();
+  RecordedFarm recorded(farm, &*store);
   RecordedProgress last;
   recorded.watch([&](const RecordedProgress& progress) { last = progress; });
   const auto whole = recorded.run(recorded.add_problem({}), {echo("a"), echo("b"), echo("c")});
   ASSERT_TRUE(whole.ok());
   EXPECT_EQ((*whole)[1].echo(), "b");
-  EXPECT_THAT(farm.asked, testing::ElementsAre("a", "b", "c"));
+  EXPECT_THAT(farm->asked, testing::ElementsAre("a", "b", "c"));
   EXPECT_EQ(last.remembered, 2u);
   EXPECT_EQ(last.simulated, 1u);
   EXPECT_EQ(last.asked, 3u);
@@ -131,28 +129,28 @@ TEST_F(AnswerStoreTest, ALongBatchIsKeptAsItGoes) {
   };
   auto store = AnswerStore::open(answers(), "build");
   ASSERT_TRUE(store.ok());
-  SlowFarm farm(*store);
+  const auto farm = std::make_shared<SlowFarm>(*store);
   {
-    RecordedFarm recorded(farm, *store, &farm, [] { return now_s; });
+    RecordedFarm recorded(farm, &*store, [] { return now_s; });
     ASSERT_TRUE(
         recorded.run(recorded.add_problem({}), {echo("a"), echo("b"), echo("c"), echo("d")}).ok());
   }
-  EXPECT_THAT(farm.kept, testing::ElementsAre(0, 0, 3, 3));
+  EXPECT_THAT(farm->kept, testing::ElementsAre(0, 0, 3, 3));
   EXPECT_EQ(*store->count(), 4);
 }
 
 TEST_F(AnswerStoreTest, OtherBuildsAndFailedWorkersAreNoAnswers) {
-  EchoFarm farm;
+  const auto farm = std::make_shared<EchoFarm>();
   for (const char* build : {"one", "two"}) {
     auto store = AnswerStore::open(answers(), build);
     ASSERT_TRUE(store.ok());
-    RecordedFarm recorded(farm, *store, &farm);
+    RecordedFarm recorded(farm, &*store);
     const std::string hash = recorded.add_problem({});
     ASSERT_TRUE(recorded.run(hash, {echo("a"), echo("bad worker")}).ok());
     ASSERT_TRUE(recorded.run(hash, {echo("a"), echo("bad worker")}).ok());
   }
-  EXPECT_THAT(farm.asked, testing::ElementsAre("a", "bad worker", "bad worker", "a", "bad worker",
-                                               "bad worker"));
+  EXPECT_THAT(farm->asked, testing::ElementsAre("a", "bad worker", "bad worker", "a", "bad worker",
+                                                "bad worker"));
 }
 
 TEST_F(AnswerStoreTest, FilesOfAnotherKindAreLeftAlone) {

@@ -22,7 +22,7 @@ class CommandRecordTest : public StoreTest {
     record.arguments = "gapfarm compare a.toml --out compared";
     record.state = "running";
     record.stage = "evaluate";
-    record.stage_number = record.stages = 1;
+    record.number = record.stages = 1;
     record.done = 10;
     record.total = 40;
     record.share = 0.25;

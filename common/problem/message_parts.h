@@ -1,0 +1,27 @@
+// Parts of a problem's message.  Internal to common/problem, but for the checks of configs.
+#pragma once
+
+#include "common/problem/problem.h"
+
+namespace gapfarm {
+
+void write_fitness(const FitnessSettings& from, v1::Fitness* to);
+// REQUIRES: a valid kind.
+FitnessSettings fitness_of_message(const v1::Fitness& from);
+// What config files are held to (common/config/problem_sections.cc); a message may come from
+// anywhere.
+Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread);
+
+// The program of scenario `external` or `objective`.
+void write_external(const Problem& problem, v1::Problem* message);
+// Errors: a program that follows runs in a scenario without them, or the other way round.
+Status check_program(const ExternalProgram& program, const Problem& problem);
+// Errors: check_program()'s, a scenario that has no program and one that lacks it, a declaration
+// that is none.
+Status read_external(const v1::Problem& message, Problem* problem);
+
+void write_residual(const Problem& problem, v1::Problem* message);
+// Errors: a scenario that takes none, check_residual()'s.  REQUIRES: the problem's commands.
+Status read_residual(const v1::Problem& message, Problem* problem);
+
+}  // namespace gapfarm
