@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "common/json/json.h"
 #include "common/trials/files.h"
 #include "tests/integration/run_program.h"
 #include "tests/planar/planar_engine.h"
@@ -143,6 +145,27 @@ TEST(PlanarCases, ANullsLogPassesTheCheck) {
   const auto truth = read_text_file(folder / "out/truth/case001.json");
   ASSERT_TRUE(truth.ok());
   EXPECT_THAT(*truth, testing::HasSubstr("\"answer\": \"none\""));
+}
+
+// Its friction is another one than the config's, which shows on a slope alone.
+TEST(PlanarCases, ATiltIsAllThatIsMissingOfARobotWithAnotherFriction) {
+  const TemporaryFolder folder;
+  const Finished made =
+      run_program("planar_cases", {folder / "out", "--nulls", "0", "--clear", "1", "--subtle", "0",
+                                   "--outside", "0", "--effects", "floor_tilt", "--sessions", "2",
+                                   "--trials", "40", "--seed", "2"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const Finished said =
+      gapfarm_command({"diagnose", std::string(GAPFARM_SOURCE_DIR) + "/configs/srv1.toml",
+                       "--trials", folder / "out/cases/case001/trials.csv", "--out",
+                       folder / "said", "--workers", "1", "--json"});
+  ASSERT_EQ(said.exit_code, 0) << said.err;
+  const Json diagnosis = parse_json(said.out);
+  EXPECT_EQ(diagnosis.at("verdict"), "effect");
+  ASSERT_EQ(diagnosis.at("effects").size(), 1u);
+  const Json& tilt = diagnosis.at("effects").front();
+  EXPECT_EQ(tilt.at("name"), "floor_tilt");
+  EXPECT_GT(tilt.at("closed").get<double>(), 0.8);
 }
 
 }  // namespace
