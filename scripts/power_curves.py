@@ -2,7 +2,7 @@
 """How often effects of stated sizes are named, beside how often the certificate says they would be.
 
     gapfarm blind-check configs/srv1.toml --out CHECK --effects battery_sag camera_aspect ... \\
-        --sizes 1.005 1.01 1.02 1.04 --per-effect 6 --nulls 12 --pairs 0 --left-out 0
+        --sizes 1.006 1.015 1.03 1.06 --per-effect 5 --nulls 8 --pairs 0 --left-out 0
     scripts/power_curves.py CHECK
 
 What is predicted comes from the check's nulls alone: the median of the sizes from which on they would
