@@ -151,8 +151,8 @@ async function diagnosed(view) {
   check((await made.ended) === 0, `nothing to diagnose: ${made.said}`);
   const diagnosis = start("diagnose", "d.toml", "--trials", "d.csv", "--out", "d", "--workers", "1");
   // Held up again and again, so that its stages are there to be seen however fast the machine is.
-  const hold = () => { diagnosis.kill("SIGSTOP"); setTimeout(() => diagnosis.kill("SIGCONT"), 400); };
-  const holding = setInterval(hold, 600);
+  const hold = () => { diagnosis.kill("SIGSTOP"); setTimeout(() => diagnosis.kill("SIGCONT"), 1400); };
+  const holding = setInterval(hold, 1600);
   const page = await open(await served(view("d")), { may });
   const stage = `document.querySelector("#tiles")?.innerText || ""`;
   await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work", 200_000);
