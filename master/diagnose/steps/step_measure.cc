@@ -87,6 +87,12 @@ Result<Explanation> put_late_readings_right(const DiagnosisRequest& of, Explanat
   return partial;
 }
 
+Result<Eigen::MatrixXd> nuisances_of(const DiagnosisRequest& of, Study& study) {
+  auto nuisances = of.subject.nuisances(of.predictor, study);
+  if (nuisances && study.session_spread > 0) *nuisances = beside_sessions(study, *nuisances);
+  return nuisances;
+}
+
 }  // namespace
 
 std::vector<BaseParameter> whole_base(const DiagnosisRequest& of, const Study& study) {
@@ -104,20 +110,29 @@ Result<Study> tune(const DiagnosisRequest& of) {
   if (!study) return study;
   Study whole = *study;
   RETURN_IF_ERROR(of.subject.tune(of.predictor, of.options.keep_base, &*study));
-  if (study->on_bounds.empty()) return study;
+  whole.base_parameters = whole_base(of, *study);
+  const bool more = whole.base_parameters.size() > study->base_parameters.size();
+  if (study->on_bounds.empty() || !more) return study;
   // What draws a part of the base to its bounds may be that the rest is kept where it is.
-  whole.drive.tuned = whole.base_parameters = whole_base(of, whole);
+  whole.drive.tuned = whole.base_parameters;
   const Status tuned = of.subject.tune(of.predictor, of.options.keep_base, &whole);
   return tuned && whole.on_bounds.empty() ? std::move(whole) : std::move(*study);
 }
 
+Evidence evidence_beside(Study study, Eigen::MatrixXd nuisances,
+                         std::vector<CovariateBlock> blocks) {
+  Eigen::VectorXd residuals = study.whitened_residuals();
+  study.drop_ignored(residuals);
+  study.drop_ignored(nuisances);
+  for (CovariateBlock& block : blocks) study.drop_ignored(block.columns);
+  Regression base(nuisances, residuals);
+  return {std::move(study), std::move(nuisances), std::move(blocks), std::move(base)};
+}
+
 Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study) {
-  auto nuisances = of.subject.nuisances(of.predictor, study);
-  if (!nuisances) return nuisances.error();
-  if (study.session_spread > 0) *nuisances = beside_sessions(study, *nuisances);
+  ASSIGN_OR_RETURN(auto nuisances, nuisances_of(of, study));
   std::vector<CovariateBlock> blocks = of.subject.blocks(study);
-  Regression base(*nuisances, study.whitened_residuals());
-  return Evidence{std::move(study), std::move(*nuisances), std::move(blocks), std::move(base)};
+  return evidence_beside(std::move(study), std::move(nuisances), std::move(blocks));
 }
 
 Result<Evidence> evidence_at(const DiagnosisRequest& of, const Evidence& before,
@@ -125,13 +140,8 @@ Result<Evidence> evidence_at(const DiagnosisRequest& of, const Evidence& before,
   Study there = before.study;
   there.base = fit.at;
   for (std::size_t i = 0; i < there.size(); ++i) there.trials[i].X_WP = fit.ends[i];
-  ASSIGN_OR_RETURN(Eigen::MatrixXd nuisances, of.subject.nuisances(of.predictor, there));
-  if (there.session_spread > 0) nuisances = beside_sessions(there, nuisances);
-  there.drop_ignored(nuisances);
-  Eigen::VectorXd residuals = before.study.whitened_residuals();
-  before.study.drop_ignored(residuals);
-  Regression base(nuisances, residuals);
-  return Evidence{before.study, std::move(nuisances), before.blocks, std::move(base)};
+  ASSIGN_OR_RETURN(auto nuisances, nuisances_of(of, there));
+  return evidence_beside(before.study, std::move(nuisances), before.blocks);
 }
 
 Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances) {
@@ -157,16 +167,9 @@ Explanation without(const Explanation& all, const std::vector<bool>& ignored) {
   Explanation rest = all;
   Study study = all.study();
   study.ignored = ignored;
-  Eigen::VectorXd residuals = study.whitened_residuals();
-  study.drop_ignored(residuals);
-  Eigen::MatrixXd nuisances = all.evidence->nuisances;
-  study.drop_ignored(nuisances);
-  std::vector<CovariateBlock> blocks = all.evidence->blocks;
-  for (CovariateBlock& block : blocks) study.drop_ignored(block.columns);
   for (Signature& s : rest.first) study.drop_ignored(s.columns);
-  Regression base(nuisances, residuals);
   rest.evidence = std::make_shared<const Evidence>(
-      Evidence{std::move(study), std::move(nuisances), std::move(blocks), std::move(base)});
+      evidence_beside(std::move(study), all.evidence->nuisances, all.evidence->blocks));
   return rest;
 }
 

@@ -111,14 +111,11 @@ Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation parti
     if (partial.names_session_gains()) continue;
     SpreadFit fit = row->fit(partial.study(), left, of.outlier_share());
     if (fit.gain < row->least_gain) continue;
-    Evidence evidence = *partial.evidence;
-    evidence.study.session_spread = fit.estimates.front().value;
-    evidence.nuisances = beside_sessions(evidence.study, evidence.nuisances);
-    evidence.study.drop_ignored(evidence.nuisances);
-    Eigen::VectorXd residuals = evidence.study.whitened_residuals();
-    evidence.study.drop_ignored(residuals);
-    evidence.base = Regression(evidence.nuisances, residuals);
-    partial.evidence = std::make_shared<const Evidence>(std::move(evidence));
+    Study study = partial.study();
+    study.session_spread = fit.estimates.front().value;
+    Eigen::MatrixXd nuisances = beside_sessions(study, partial.evidence->nuisances);
+    partial.evidence = std::make_shared<const Evidence>(
+        evidence_beside(std::move(study), std::move(nuisances), partial.evidence->blocks));
     partial.spreads.push_back({row, std::move(fit), {}});
   }
   return partial;

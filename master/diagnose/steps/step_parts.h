@@ -38,6 +38,9 @@ bool clearly_better(const std::vector<double>& scores, const std::vector<double>
 // What tuning moves, and what else of the base the config has searched, within its prior.
 std::vector<BaseParameter> whole_base(const DiagnosisRequest& of, const Study& study);
 
+// A study beside these, without what ignored trials say.
+Evidence evidence_beside(Study study, Eigen::MatrixXd nuisances,
+                         std::vector<CovariateBlock> blocks);
 // The study's nuisances and covariates by its present noise.
 Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study);
 // The same beside nuisances as they are where that fit ended.
