@@ -73,15 +73,16 @@ TEST(Watch, WatchesEverySizeOfTheRobotAndAllWheelsTogether) {
   }
 }
 
-// One call in twenty does; of thirty, 1 to 30, the second.
-TEST(Watch, NamesNothingOfRobotsThatDoNotChange) {
+// But for one call in twenty: of fleets 1 to 30 the second alone is.
+TEST(Watch, NamesNextToNothingOfRobotsThatDoNotChange) {
   const WatchedRows rows = rows_of_create();
-  for (std::uint64_t seed = 3; seed <= 5; ++seed) {
+  std::size_t named = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const FleetChanges changes = find_changes(rows, make_fleet(rows, seed), 1);
-    EXPECT_TRUE(changes.steps.empty()) << seed;
-    EXPECT_TRUE(changes.odd_robots.empty()) << seed;
     EXPECT_LE(changes.thresholds.false_alarms, 0.05);
+    named += changes.steps.size() + changes.odd_robots.size();
   }
+  EXPECT_LE(named, 1u);
 }
 
 TEST(Watch, NamesTheRobotTheWheelAndTheRun) {
