@@ -15,6 +15,8 @@ import pathlib
 import statistics
 import sys
 
+from foreign_tables import wilson
+
 POWER = 0.95
 LEAST_GAIN = 9.0  # nats that a name asks for (docs/diagnosis.md), one parameter
 STUDENT = 0.849  # of twice a gain, what Student's weights leave on Gaussian noise (infer/certificate.cc)
@@ -32,13 +34,6 @@ def chance(size):
     z = -next(k / 1000 for k in range(-5000, 0) if normal_above(k / 1000) < POWER)
     at = (threshold + z) * size
     return normal_above(threshold - at) + normal_above(threshold + at)
-
-
-def wilson(hits, total, z=1.96):
-    """95 % interval of a share."""
-    middle = (hits + z * z / 2) / (total + z * z)
-    half = z * math.sqrt(hits * (total - hits) / total + z * z / 4) / (total + z * z)
-    return middle - half, middle + half
 
 
 def diagnosis(folder, case):
@@ -80,12 +75,9 @@ def main():
         named = any(effect in [one["name"], *one["aliases"]] for one in said["effects"])
         for at in ((effect, truth["level"]), (effect, "all"), ("all", "all")):
             rows.setdefault(at, []).append((expected, named))
-    print("| effect | size | cases | named | [95 %] | predicted |\n|---|---|---|---|---|---|")
+    print("| effect | size | cases | named [95 %] | predicted |\n|---|---|---|---|---|")
     for (effect, level), of in sorted(rows.items()):
-        hits = sum(named for _, named in of)
-        low, high = wilson(hits, len(of))
-        print(f"| {effect} | {level} | {len(of)} | {100 * hits / len(of):.0f} % "
-              f"| [{100 * low:.0f}, {100 * high:.0f}] "
+        print(f"| {effect} | {level} | {len(of)} | {wilson(sum(named for _, named in of), len(of))} "
               f"| {100 * statistics.mean(expected for expected, _ in of):.0f} % |")
 
 
