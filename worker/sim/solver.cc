@@ -83,27 +83,35 @@ void project_onto_ellipse(double a1, double a2, double ratio, double radius, dou
   p2 = u2 * scale * ratio;
 }
 
-constexpr double kSolved = 1e-7;
+// Where a row of friction, which has no depth to repair, keeps the multiplier of its last sweep.
+double& multiplier_of(btSolverConstraint& row) { return row.m_rhsPenetration; }
+
+// Of a sum that is to be 1.  Newton's step from there leaves an error of about its square.
+constexpr double kSolved = 1e-5;
+constexpr int kMostNewtonSteps = 8;  // two or three do but where a contact begins to slide
 
 // The impulses of a surface that creeps: with u = (p1, p2 / ratio) / radius, the velocity that is
 // left along a row is -slip u / sqrt(1 - |u|^2) (times 1 / ratio across), so that friction grows
 // with the sliding speed and reaches the ellipse where that is large beside `slip` (m/s).  As above
-// u is a function of one multiplier, for which a secular equation is solved the same way.
+// u is a function of one multiplier, for which a secular equation is solved the same way, from
+// where the last sweep of this step left `multiplier`; 0: from bounds.  From below the root steps
+// stay below it, and from above one leads below (1/|u| is concave).
 void creep_within_ellipse(double a1, double a2, double ratio, double radius, double slip,
-                          double& p1, double& p2) {
+                          double& multiplier, double& p1, double& p2) {
   if (radius <= 0) {
     p1 = p2 = 0;
     return;
   }
   const double h1 = a1;
   const double h2 = a2 * ratio * ratio;
-  const double g1 = h1 * p1 / radius;
-  const double g2 = h2 * p2 / (ratio * radius);
-  const double least = slip / radius;
-  double multiplier = least;
-  double u1 = 0, u2 = 0;
-  for (int i = 0; i < 4; ++i) {
-    // Reciprocals, because this is where a worker spends a third of its time.
+  const double inverse = 1 / radius;
+  const double g1 = h1 * p1 * inverse;
+  const double g2 = a2 * ratio * p2 * inverse;
+  const double least = slip * inverse;
+  if (multiplier == 0) multiplier = std::sqrt(g1 * g1 + g2 * g2) - std::max(h1, h2);
+  for (int i = 0; i < kMostNewtonSteps; ++i) {
+    multiplier = std::max(multiplier, least);
+    // Reciprocals, because this is where a worker spends a quarter of its time.
     const double i1 = 1 / (h1 + multiplier);
     const double i2 = 1 / (h2 + multiplier);
     const double i0 = 1 / multiplier;
@@ -112,13 +120,14 @@ void creep_within_ellipse(double a1, double a2, double ratio, double radius, dou
     const double s0 = least * i0 * least * i0;
     const double sum = s1 + s2 + s0;
     multiplier += sum / (s1 * i1 + s2 * i2 + s0 * i0) * (std::sqrt(sum) - 1);
-    if (std::abs(sum - 1) < kSolved) break;  // Newton's next step would be of its square
+    if (std::abs(sum - 1) < kSolved) break;
   }
-  u1 = g1 / (h1 + multiplier);
-  u2 = g2 / (h2 + multiplier);
-  const double scale = 1 / std::sqrt(std::max(1.0, u1 * u1 + u2 * u2));
-  p1 = u1 * scale * radius;
-  p2 = u2 * scale * ratio * radius;
+  const double u1 = g1 / (h1 + multiplier);
+  const double u2 = g2 / (h2 + multiplier);
+  const double length_2 = u1 * u1 + u2 * u2;
+  const double onto = length_2 > 1 ? radius / std::sqrt(length_2) : radius;
+  p1 = u1 * onto;
+  p2 = u2 * onto * ratio;
 }
 
 }  // namespace
@@ -139,6 +148,7 @@ void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, in
           m_tmpSolverContactFrictionConstraintPool[normal.m_frictionIndex + d];
       row.m_appliedImpulse = info.m_warmstartingFactor * (d == 0 ? point.m_appliedImpulseLateral1
                                                                  : point.m_appliedImpulseLateral2);
+      multiplier_of(row) = 0;
       moving_side(m_tmpSolverBodyPool, row).apply(row.m_appliedImpulse);
       // The first row holds the friction, the second the ratio; only the table has a grain.
       if (d == 0) continue;
@@ -217,13 +227,14 @@ double EllipseFrictionSolver::solve_friction() {
     const double radius = rows[0].m_friction * normal.m_appliedImpulse;
     if (ratio < 0 && rows[0].m_cfm > 0) {
       double none = 0;
-      creep_within_ellipse(a1, a1, 1, radius, rows[0].m_cfm, p1, none);
-      creep_within_ellipse(a2, a2, 1, -ratio * radius, rows[0].m_cfm, p2, none);
+      const double slip = rows[0].m_cfm;
+      creep_within_ellipse(a1, a1, 1, radius, slip, multiplier_of(rows[0]), p1, none);
+      creep_within_ellipse(a2, a2, 1, -ratio * radius, slip, multiplier_of(rows[1]), p2, none);
     } else if (ratio < 0) {
       p1 = std::clamp(p1, -radius, radius);
       p2 = std::clamp(p2, ratio * radius, -ratio * radius);
     } else if (rows[0].m_cfm > 0) {
-      creep_within_ellipse(a1, a2, ratio, radius, rows[0].m_cfm, p1, p2);
+      creep_within_ellipse(a1, a2, ratio, radius, rows[0].m_cfm, multiplier_of(rows[0]), p1, p2);
     } else {
       project_onto_ellipse(a1, a2, ratio, radius, p1, p2);
     }
