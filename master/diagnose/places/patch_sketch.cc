@@ -86,6 +86,7 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study)
     for (int k = 0; k < kSteps; ++k) {
       driven.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
       driven.contacts.push_back(contacts_at(trial.X_WS * exp(Twist(whole * (k + 0.5) / kSteps))));
+      for (const Eigen::Vector2d& contact : driven.contacts.back()) driven.around.extend(contact);
     }
   }
   for (double ratio : kRatios) shifts_.push_back(shifts(ratio));
@@ -186,6 +187,10 @@ PatchSketch::Contacts PatchSketch::contacts_at(const Pose& X_WB) const {
 // Of the end, in the predicted end's axes.
 Eigen::Vector3d PatchSketch::shift_of(const DrivenPath& driven, const Patch& patch,
                                       const Shifts& shifts) const {
+  const Eigen::Vector2d centre(patch[0], patch[1]);
+  if (driven.around.squaredExteriorDistance(centre) >= patch[2] * patch[2]) {
+    return Eigen::Vector3d::Zero();
+  }
   std::size_t k = 0;
   while (k < kSteps) {
     const unsigned set = inside(driven.contacts[k], patch);

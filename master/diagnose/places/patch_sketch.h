@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <vector>
 
@@ -46,6 +47,7 @@ class PatchSketch {
     Pose X_WE;
     std::vector<Pose> X_WB;          // where each step begins
     std::vector<Contacts> contacts;  // in its middle
+    Eigen::AlignedBox2d around;      // all of these
   };
   using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
   Contacts contacts_at(const Pose& X_WB) const;
