@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <nlopt.hpp>
 #include <utility>
 
 #include "common/base/try.h"
@@ -42,6 +44,8 @@ class Search {
   // At these points, without slopes.
   Result<std::vector<Runner>> from(const std::vector<Runner>& others) const;
   Status run(int steps, std::vector<Runner>* runners) const;
+  // Those that gained less than a part of what they promised beyond `score`, without slopes.
+  Status search_blindly(double score, std::vector<Runner>* runners) const;
 
  private:
   Fitter fitter(const Space& space) const {
@@ -49,6 +53,7 @@ class Search {
   }
   Result<std::vector<Runner>> at_starts(std::size_t hypothesis, const Anchor& anchor) const;
   Result<Fit> from_neutral(const Hypothesis& h, const Fitter& fitter, const Anchor& anchor) const;
+  Status search_blindly(Runner* runner) const;
 
   const Scope& scope_;
   const Space& base_;
@@ -166,6 +171,72 @@ Status Search::run(int steps, std::vector<Runner>* runners) const {
   return {};
 }
 
+using Objective = std::function<double(const std::vector<double>&)>;
+
+// The highest point that so many evaluations find within those bounds.
+std::vector<double> climbed(const Objective& objective, int evaluations, std::vector<double> from,
+                            const std::vector<double>& lower, const std::vector<double>& upper) {
+  nlopt::opt search(nlopt::LN_SBPLX, static_cast<unsigned>(from.size()));
+  search.set_max_objective(
+      [](unsigned n, const double* at, double*, void* self) {
+        return (*static_cast<const Objective*>(self))(std::vector<double>(at, at + n));
+      },
+      const_cast<Objective*>(&objective));
+  search.set_lower_bounds(lower);
+  search.set_upper_bounds(upper);
+  search.set_initial_step(kBlindStep);
+  search.set_ftol_abs(kSettledGain / 5);
+  search.set_maxeval(evaluations);
+  double value = 0;
+  try {
+    search.optimize(from, value);
+  } catch (const std::exception&) {
+    // Roundoff, where nothing is left to gain; `from` holds the best point so far.
+  }
+  return from;
+}
+
+Status Search::search_blindly(Runner* runner) const {
+  const Hypothesis& h = hypotheses_[runner->hypothesis];
+  const Fitter fits = fitter(runner->space);
+  const Eigen::VectorXd base = runner->fit.u.head(base_.dimensions());
+  const Eigen::VectorXd own = runner->fit.u.tail(runner->fit.u.size() - base.size());
+  ASSIGN_OR_RETURN(const Fit without, fitter(base_).start(base));
+  if (!std::isfinite(without.score)) return {};
+  Status failed;
+  const auto score = [&](const std::vector<double>& x) {
+    const Eigen::VectorXd u =
+        joined(base, Eigen::VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size())));
+    const auto touched = within(scope_, h.touched(runner->space.values(u)));
+    if (touched.empty() || !failed) return without.score;
+    const auto fit = fits.starts({u}, {runner->space}, {touched}, without.z);
+    if (!fit) failed = fit.error();
+    return fit && std::isfinite(fit->front().score) ? fit->front().score : -1e300;
+  };
+  const auto listed = [&](const Eigen::VectorXd& bounds) {
+    return std::vector<double>(bounds.begin(), bounds.end());
+  };
+  const Eigen::VectorXd far = Eigen::VectorXd::Constant(own.size(), kLongestStep);
+  const std::vector<double> best =
+      climbed(score, kBlindSearch * static_cast<int>(own.size()), listed(own),
+              listed(runner->space.lower().tail(own.size()).cwiseMax(own - far)),
+              listed(runner->space.upper().tail(own.size()).cwiseMin(own + far)));
+  if (!failed) return failed;
+  auto fit = fits.start(joined(base, Eigen::VectorXd::Map(best.data(), own.size())));
+  if (!fit) return fit.error();
+  if (fit->score > runner->fit.score) runner->fit = std::move(*fit);
+  return {};
+}
+
+Status Search::search_blindly(double score, std::vector<Runner>* runners) const {
+  for (Runner& runner : *runners) {
+    const Hypothesis& h = hypotheses_[runner.hypothesis];
+    if (!h.touched || kMostTrust * (runner.fit.score - score) > h.promised) continue;
+    if (Status s = search_blindly(&runner); !s) return s;
+  }
+  return {};
+}
+
 // The base alone begins once more where the best has it: what a hypothesis gains is not to be that
 // its search found a better base.
 Result<Model> refitted_base(const Forward& forward, const Observations& observations, Model base,
@@ -249,6 +320,7 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
   auto best = half ? whole.from(*runners) : std::move(runners);
   if (!best) return best.error();
   if (Status s = whole.run(kMiddleSearch, &*best); !s) return s.error();
+  if (Status s = whole.search_blindly(base.fit.score, &*best); !s) return s.error();
   report(*best);
   const double worth = base.fit.score + terms.least_gain;
   std::erase_if(*best, [&](const Runner& r) { return r.fit.score < worth; });

@@ -29,6 +29,11 @@ struct Hypothesis {
   // Nats that its best fit gains by chance beyond half a one a dimension: that its start is the
   // best of many places was seen in all observations.
   double luck = 0;
+  // What has a place: the observations that it can change there (ascending; the others are as
+  // without it), and nats that it promises to first order.  Its slopes lie, since ends jump as a
+  // drive comes to pass by its edge.
+  std::function<std::vector<std::uint32_t>(const Overrides&)> touched = {};
+  double promised = 0;
 };
 
 // What explains the observations so far.

@@ -38,6 +38,10 @@ inline constexpr std::size_t kFewStarts = 16;
 // Steps of the leaders, and of the finalists; before that every start has one, the better half
 // one more, and so on.
 inline constexpr int kMiddleSearch = 4, kLongSearch = 10;
+// Predictions a dimension where slopes lie, as BOBYQA has a gene (docs/evidence/optimisers.md), and
+// the first step, in units of a coordinate.
+inline constexpr int kBlindSearch = 40;
+inline constexpr double kBlindStep = 0.5;
 // Hypotheses that go on.
 inline constexpr std::size_t kLeaders = 5, kFinalists = 3;
 // Standard errors by which a lead over an alternative, or a gain that is to stay, is no chance: one

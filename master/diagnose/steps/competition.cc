@@ -159,6 +159,22 @@ std::vector<infer::Hypothesis> Competition::of_rows(const std::set<std::string>&
   return hypotheses;
 }
 
+// Observations that a disc there can change.
+std::vector<std::uint32_t> Competition::touched_by(const std::string& effect,
+                                                   const Overrides& at) const {
+  Patch disc;
+  for (std::size_t k = 0; k < disc.size(); ++k) {
+    constexpr const char* kKeys[] = {".x", ".y", ".radius", ".ratio"};
+    disc[k] = at.at(of_.table().row(effect + kKeys[k]));
+  }
+  const std::vector<bool> touched = study_.subject->touched_by(of_.problem, study_, disc);
+  std::vector<std::uint32_t> trials;
+  for (std::uint32_t i = 0; i < touched.size(); ++i) {
+    if (touched[i]) trials.push_back(i);
+  }
+  return infer::within(scope_, trials);
+}
+
 infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
                                        const Regression& explained) const {
   infer::Hypothesis h;
@@ -174,9 +190,10 @@ infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
   }
   if (!mark.signature.whole) return h;
   // What has a place does nothing elsewhere.
-  for (std::uint32_t i = 0; i < study_.size(); ++i) {
-    if (!mark.signature.columns.middleRows<3>(3 * i).isZero(0)) start.reach.push_back(i);
-  }
+  h.promised = mark.gain;
+  h.touched = [this, effect = h.name](const Overrides& at) { return touched_by(effect, at); };
+  start.reach = h.touched(start.at);
+  if (start.reach.empty()) h.starts.clear();
   return h;
 }
 

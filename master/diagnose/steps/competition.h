@@ -37,6 +37,8 @@ class Competition {
   Eigen::MatrixXd in_all_trials(const Eigen::MatrixXd& rows) const;
 
  private:
+  std::vector<std::uint32_t> touched_by(const std::string& effect, const Overrides& at) const;
+
   const DiagnosisRequest& of_;
   const Study& study_;
   infer::Forward all_;
