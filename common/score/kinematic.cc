@@ -116,11 +116,12 @@ class Body {
   Pose observed(const Pose& X) const { return {scale_ * X.x, scale_ * aspect_ * X.y, X.theta}; }
   Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
 
-  // The commands as this robot takes them: later by a clock that drifts, weaker by a battery that
-  // sags, both counted from `began_s`.  In `changed` where they are not those of the log.
+  // The commands as this robot takes them: later by a clock that drifts, as fast by the tracker's
+  // clock as by its own where that is what drifts, weaker by a battery that sags; both counted from
+  // `began_s`.  In `changed` where they are not those of the log.
   std::span<const CommandRow> taken(std::span<const CommandRow> logged, double began_s,
                                     std::vector<CommandRow>* changed) const {
-    if (sag_ == 0 && drift_ == 0) return logged;
+    if (sag_ == 0 && drift_ == 0 && rate_ == 0) return logged;
     std::vector<CommandRow>& rows = *changed;
     rows.assign(logged.begin(), logged.end());
     const bool throttled = robot_.command == CommandKind::kThrottleSteering;
@@ -129,8 +130,9 @@ class Body {
       for (std::size_t c = 0; c < row.values.size(); ++c) {
         const bool power = robot_.channels[c] != "steering";
         if (power && (!throttled || robot_.channels[c] == "throttle")) row.values[c] *= left;
+        if (power && !throttled) row.values[c] /= 1 + rate_;
       }
-      row.t_s += drift_ * (row.t_s - began_s);
+      row.t_s += (drift_ + rate_) * (row.t_s - began_s);
     }
     return rows;
   }
@@ -215,6 +217,7 @@ class Body {
     }
     if (name == "sag") sag_ = value;
     if (name == "drift") drift_ = value;
+    if (name == "rate") rate_ = value;
     if (name == "grip") grip_m_s2_ = std::exp(value);
     if (name == "slip_angle") slip_angle_rad_ = value;
     if (name == "grip_shape") grip_shape_ = std::exp(value);
@@ -277,7 +280,7 @@ class Body {
   double separation_ratio_ = 1;
   double travel_ = 1, traction_ = 1;  // of holonomic robots
   Eigen::Vector2d load_;              // where the weight stands on their wheels
-  double sag_ = 0, drift_ = 0, scale_ = 1, aspect_ = 1;
+  double sag_ = 0, drift_ = 0, rate_ = 0, scale_ = 1, aspect_ = 1;
   double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
   std::optional<double> grip_m_s2_;  // none: no speed slips
   double slip_angle_rad_ = 0;

@@ -36,7 +36,9 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // stand: "travel" (ratio of all wheels), "steering_left" and "_right" (ratio of the table's angles
 // that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain), "dead_band" (the
 // command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of the command lost
-// a minute), "drift" (s that the command's clock loses a second), "grip" (of cars: logarithm of the
+// a minute), "drift" (s that the
+// clock of whoever logs the commands loses a second), "rate" (the same of the robot's own clock, by
+// which it also drives), "grip" (of cars: logarithm of the
 // acceleration to the side that the floor holds, m/s^2) with "slip_angle" (rad, of the rear axle
 // there; in place of the file's understeer) and "grip_shape" (logarithm of the power p in
 // 1 / (1 + share^p)^(1/p), how sharply curvature falls where the grip ends), "pose_scale" and

@@ -230,6 +230,8 @@ void Catalogue::motors() {
         {row("delay")});
   value("clock_drift", {"clock_offset"}, "the rate of one clock against the other",
         {{"drift", 0, 2e-5, "rate", "s/s"}});
+  value("clock_drift", {"clock_offset"}, "the rate of the robot's clock against the tracker's",
+        {{"rate", 0, 2e-5, "rate", "s/s"}});
   more("battery_sag", {}, "what the drive loses a minute", {{"sag", 0, 0.005, "rate", "1/min"}});
   // Motors lie before what was measured, unless the file states them all the same.
   if (!robot_.measured || robot_.motors.lag_s > 0) {
@@ -340,15 +342,24 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
 }
 
 std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all) {
-  if (!log.relative) return all;
-  std::erase_if(all, [](const GroundHypothesis& h) { return h.of_world; });
+  if (log.relative) std::erase_if(all, [](const GroundHypothesis& h) { return h.of_world; });
   for (GroundHypothesis& h : all) {
-    // Upside down a sensor sees every turn and every step aside the other way, as if the robot's
-    // own had been taken for one another: increments do not distinguish these.
+    // In a mirrored world every turn and every step aside is the other way, as if the robot's own
+    // had been taken for one another, and so they are for a sensor that hangs upside down.
     if (h.name != "sides_swapped" && h.name != "steering_reversed") continue;
-    h.thing += " (or a sensor that is mounted upside down)";
-    h.remedy += " If the sensor is upside down, turn the signs of y and theta instead.";
-    h.aliases.push_back("sensor_upside_down");
+    const std::string other =
+        log.relative ? "a sensor that is mounted upside down" : "y and headings both mirrored";
+    h.thing += " (or " + other + ")";
+    h.remedy += " If it is " + other + ", turn the signs of y and theta instead.";
+    h.aliases.emplace_back(log.relative ? "sensor_upside_down" : "axes_mirrored");
+  }
+  const bool has_gyro =
+      std::ranges::any_of(log.runs, [](const LoggedRun& run) { return !run.yaw_rates.empty(); });
+  if (has_gyro) {
+    GroundHypothesis& gyro = all.emplace_back();
+    gyro.name = kGyroScale;
+    gyro.thing = "the scale of the gyro";
+    gyro.freed = {{kGyroScale, 1, kGyroShare, "ratio", "-"}};
   }
   return all;
 }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/base/try.h"
+#include "common/math/statistics.h"
 #include "master/ground/search.h"
 #include "master/ground/tolerances.h"
 
@@ -66,7 +67,7 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
     // Densities are of what was logged, in its own unit.
     fault.objective =
         WindowFitter(robot, *windows, reference).hold(rows, nominals(rows)).objective +
-        2 * stretches * std::log(catalogue[i].metres);
+        stretches * std::log(catalogue[i].metres * catalogue[i].metres * catalogue[i].radians);
     fault.gain = fault.objective - before;
     fault.shrinks = std::exp(fault.gain / (3 * stretches));
     if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;
@@ -147,6 +148,27 @@ bool names_rounding(const GroundSearch& search) {
   return rounding_m >= kLeastRounding * search.free_fit.scales.front().head<2>().minCoeff();
 }
 
+std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit) {
+  const WindowSet& windows = fitter.windows();
+  const std::vector<std::size_t> run = runs_of(windows);
+  std::vector<std::vector<double>> misses(windows.run_blocks.size());
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    const Eigen::Vector3d& scale = fit.scales[static_cast<std::size_t>(windows.horizon[i])];
+    misses[run[i]].push_back(fit.residuals[i].cwiseQuotient(scale).norm());
+  }
+  std::vector<FarRun> odd;
+  for (std::size_t r = 0; r < misses.size(); ++r) {
+    std::vector<double> others;
+    for (std::size_t other = 0; other < misses.size(); ++other) {
+      if (other != r && !misses[other].empty()) others.push_back(median(misses[other]));
+    }
+    if (misses[r].empty() || others.size() < 2) continue;
+    const double times = median(misses[r]) / std::max(median(others), 1e-12);
+    if (times > kOddRun) odd.push_back({r, times});
+  }
+  return odd;
+}
+
 std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,
                                                   const WindowFit& fit) {
   const WindowSet& windows = fitter.windows();
@@ -180,6 +202,8 @@ std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,
   double own = 0;
   for (std::size_t r = 0; r < runs; ++r) {
     if (counts[r] == 0) continue;
+    const double shift_s = std::abs(at_s[r] - fit.values[delay]);
+    if (shift_s > kClockStep_s * (kClockSteps - 0.5)) return {};  // no clock within reach
     clocks.push_back({r, at_s[r]});
     own += best[r];
   }

@@ -21,7 +21,6 @@ constexpr double kFarOff = 20;
 // How little a value may be off that no log shows: of its tolerance.
 constexpr double kHeld = 1e-6;
 constexpr std::size_t kLeastWindows = 10;  // of one length, whose scatter is theirs to show
-constexpr double kUnshown = 0.7;  // of the prior's deviation: a log that leaves more says nothing
 // Headings of the tracked point that a fit begins at, how many of them are followed, for how many
 // rounds, and for how many more where faults are compared.
 constexpr int kTurns = 8;
@@ -241,7 +240,7 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
   }
   reference.values = fit.values;
   reference.windows = fitter.ended_windows(fit);
-  reference.draws = fitter.draws(fit, seed).colwise() - fit.values;
+  reference.draws = fitter.draws(fit, seed, /*all=*/true).colwise() - fit.values;
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     if (fit.rows[k].row.name != "grip") continue;
     const double unsure = unsure_grip(fitter, fit, k);
@@ -253,9 +252,7 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     const auto draws = reference.draws.row(k);
     const double deviation = draws.norm() / std::sqrt(static_cast<double>(draws.size()));
-    const FitRow& row = fit.rows[k];
-    reference.shown.push_back(deviation > kHeld * row.row.tolerance &&
-                              (!row.free || deviation < kUnshown * plausible_error(row.row)));
+    reference.shown.push_back(deviation < kUnshown * prior_deviation(fit.rows[k]));
   }
   reference.covariance =
       reference.draws * reference.draws.transpose() / static_cast<double>(reference.draws.cols());

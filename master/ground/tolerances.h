@@ -78,6 +78,7 @@ inline constexpr PlausibleError kPlausibleErrors[] = {
     {"lag", 0.3, "s"},
     {"delay", 1.5, "s"},
     {"drift", 0.003, "s/s"},
+    {"rate", 0.003, "s/s"},
     {"sag", 0.05, "1/min"},
     {"ramp", 5, "s^2/m"},
     {"marker_x", 0.3, "m"},
@@ -119,6 +120,11 @@ inline constexpr double kFaultGain = 10;
 // the first: what changed is modelled with a form that is wrong by some share.
 inline constexpr double kChangeShrinks = 1.01;
 inline constexpr double kShareOfFirst = 0.5;
+// A log that leaves more than this share of the deviation of a value's prior does not show it.
+inline constexpr double kUnshown = 0.7;
+// A run is off by itself where its windows miss by this many times what the other runs' do, in the
+// median: real runs of the cases reach 2.8, one that is mirrored alone 50 and more.
+inline constexpr double kOddRun = 4;
 // Of the frames on the way, for stale frames to be named: the Warthog's laser poses repeat 2 %.
 inline constexpr double kLeastStaleShare = 0.03;
 // Rounding is named where it is this share of the scatter of the shortest windows or more: a tenth

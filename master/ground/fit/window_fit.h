@@ -19,6 +19,9 @@ struct FitRow {
   bool free = false;  // held by plausible_error() in place of the tolerance
 };
 
+// Standard deviation of a row's prior, from no data.
+double prior_deviation(const FitRow& row);
+
 // Where they stand as long as no log has its say.
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows);
 
@@ -100,8 +103,8 @@ class WindowFitter {
 
   // Values by runs drawn with replacement and blocks of them, one Gauss-Newton step each, a column
   // a draw: what differs from run to run (a clock's offset) is no surer for a run that is long.
-  // Free values that no window shows scatter as their priors do.
-  Eigen::MatrixXd draws(const WindowFit& fit, std::uint64_t seed) const;
+  // Free values, or all, that no window shows scatter as their priors do.
+  Eigen::MatrixXd draws(const WindowFit& fit, std::uint64_t seed, bool all = false) const;
   // 90 % intervals of them; a row of (lo, hi) for each of the fit's.  With a reference: of how far
   // they are from it, which is not sure either, beside its values.
   Eigen::MatrixX2d intervals(const WindowFit& fit, std::uint64_t seed) const;

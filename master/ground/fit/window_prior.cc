@@ -77,14 +77,16 @@ Eigen::Index WindowFitter::in_reference(const FitRow& row) const {
   return found == names.end() ? -1 : found - names.begin();
 }
 
+double prior_deviation(const FitRow& row) {
+  if (!row.free) return row.row.tolerance;
+  return row.row.farthest > 0 ? row.row.farthest : plausible_error(row.row);
+}
+
 Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) const {
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const FitRow& row = rows[k];
-    double deviation = row.free ? plausible_error(row.row) : row.row.tolerance;
-    if (row.free && row.row.farthest > 0) deviation = row.row.farthest;
-    covariance(k, k) = deviation * deviation;
+    covariance(k, k) = std::pow(prior_deviation(rows[k]), 2);
   }
   if (reference_ == nullptr) return covariance.diagonal().cwiseInverse().asDiagonal();
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -133,7 +135,7 @@ std::vector<Eigen::Vector3d> WindowFitter::curvature_shares(const WindowFit& fit
   return curvatures;
 }
 
-Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) const {
+Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bool all) const {
   const Eigen::Index n = fit.values.size();
   const auto blocks = static_cast<std::size_t>(windows_.blocks);
   const std::vector<double> use = uses({});
@@ -162,7 +164,7 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
       const FitRow& row = fit.rows[k];
       const Eigen::Index a = in_reference(row);
       if (a >= 0) from[k] -= reference_->draws(a, d);
-      if (a < 0 && row.free) from[k] -= stream.normal() / std::sqrt(P(k, k));
+      if (a < 0 && (row.free || all)) from[k] -= stream.normal() / std::sqrt(P(k, k));
     }
     Eigen::MatrixXd A = P;
     Eigen::VectorXd b = P * from;

@@ -55,6 +55,7 @@ class GroundReport {
   const GroundDiagnoseOptions& options_;
   WindowFitter fitter_;
   Eigen::MatrixX2d intervals_;
+  std::string unseen_;  // which values no window shows; empty: none
   GroundFigures figures_;
   Diagnosis d_;
 };
@@ -204,8 +205,11 @@ void GroundReport::judge() {
   figures_.faults += static_cast<int>(search_.faults.size());
   figures_.closable = search_.closable;
   figures_.best_of_all = search_.best_of_all;
+  figures_.odd_runs = text_of_odd_runs(search_, far_runs(fitter_, search_.fit));
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
+  unseen_ = values_not_shown(fitter_, search_, options_.seed);
+  if (!unseen_.empty()) d_.cautions.push_back(unseen_);
   if (nothing_is_left(figures_)) return;
   d_.where = where_left(fitter_, search_, options_.windows.horizons_s);
   const std::string moved = values_that_would_move(search_);
@@ -303,10 +307,11 @@ void GroundReport::name_headline() {
         changes   ? (nothing ? "Nothing changed by more than a robot does from log to log."
                              : "Something changed that nothing of the catalogue explains alone.")
         : nothing ? nothing_wrong(robot_)
-        : figures_.closable.lo > 0
+        : something_is_left(figures_)
             ? "Something is wrong that nothing of the catalogue explains alone."
             : "Nothing is significantly wrong, but these runs do not exclude it.";
     if (!d_.findings.empty()) d_.headline += " " + d_.findings.front();
+    if (!unseen_.empty()) d_.headline += " " + unseen_;
     return;
   }
   d_.headline = d_.effects.front().text;

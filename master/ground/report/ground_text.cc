@@ -8,6 +8,8 @@
 #include <cctype>
 #include <cmath>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/math/laws.h"
 #include "master/ground/fit/window_prior.h"
 #include "master/ground/tolerances.h"
@@ -227,8 +229,13 @@ bool may_be_named(const HeldOutGain& gain) { return std::isfinite(gain.lo) && ga
 
 bool nothing_is_left(const GroundFigures& figures) {
   const HeldOutGain& left = figures.closable;
-  return std::isfinite(left.mean) && std::isfinite(left.hi) &&
+  return figures.odd_runs.empty() && std::isfinite(left.mean) && std::isfinite(left.hi) &&
          std::max(left.mean, left.hi) <= kToleratedGap;
+}
+
+bool something_is_left(const GroundFigures& figures) {
+  return !figures.odd_runs.empty() ||
+         (figures.closable.lo > 0 && figures.closable.mean > kToleratedGap);
 }
 
 Verdict ground_verdict(const GroundFigures& figures) {
@@ -248,7 +255,12 @@ std::string verdict_reason(const GroundFigures& figures) {
         "{:.2g}, residuals 10 % smaller.",
         closes, kToleratedGap);
   }
-  if (left.lo > 0) {
+  if (!figures.odd_runs.empty()) {
+    return figures.odd_runs +
+           " Look at the commands and the poses of these: another run's, the other way round, or "
+           "something that happened there alone.";
+  }
+  if (something_is_left(figures)) {
     const std::string what = figures.best_of_all.empty() ? "" : ", " + figures.best_of_all + ",";
     return fmt::format(
         "The best of what was tried{} closes another {} on stretches that were not fitted, and "
@@ -300,6 +312,34 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
   std::stable_sort(found.begin(), found.end(),
                    [](const Where& a, const Where& b) { return a.share > b.share; });
   return found;
+}
+
+std::string text_of_odd_runs(const GroundSearch& search, const std::vector<FarRun>& odd) {
+  return joined(odd, " ", [&](const FarRun& o) {
+    return fmt::format("Run {} misses by {:.0f} times as much as the others.",
+                       search.log.runs[o.run].run, o.times);
+  });
+}
+
+std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& search,
+                             std::uint64_t seed) {
+  const WindowFit& fit = search.free_fit;
+  const Eigen::MatrixXd draws = fitter.draws(fit, seed).colwise() - fit.values;
+  const double root = std::sqrt(static_cast<double>(draws.cols()));
+  std::vector<std::string> things;
+  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+    const std::string& name = fit.rows[k].row.name;
+    // What lies before measured wheel speeds is a caution of its own.
+    if (fitter.robot().measured && (name == "lag" || name == "delay")) continue;
+    if (draws.row(k).norm() / root < kUnshown * prior_deviation(fit.rows[k])) continue;
+    const auto of = std::ranges::find_if(search.catalogue, [&](const GroundHypothesis& h) {
+      return contains(h.freed, name, &KinematicRow::name);
+    });
+    if (of != search.catalogue.end() && !contains(things, of->thing)) things.push_back(of->thing);
+  }
+  if (things.empty()) return "";
+  return "These runs do not show whether these are right: " +
+         joined(things, ", ", [](const std::string& thing) { return thing; }) + ".";
 }
 
 std::string values_that_would_move(const GroundSearch& search) {

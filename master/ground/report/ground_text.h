@@ -43,12 +43,16 @@ struct GroundFigures {
   // of the catalogue, every value free) would still gain, held out.
   HeldOutGain closable;
   std::string best_of_all = {};  // what that was: "floor_edge"
+  std::string odd_runs = {};     // which runs are off by themselves; empty: none
 };
 
 // Whether a value may be named: its gain's interval lies above 0.
 bool may_be_named(const HeldOutGain& gain);
 
-// Whether what is left lies within kToleratedGap, all of its interval.
+// Whether it is significant and, as far as anybody can say, more than kToleratedGap, or a run is
+// odd.
+bool something_is_left(const GroundFigures& figures);
+// Whether what is left lies within kToleratedGap, all of its interval, and no run is odd.
 bool nothing_is_left(const GroundFigures& figures);
 
 // REQUIRES: every gain of `named` may be named.
@@ -65,6 +69,14 @@ std::string verdict_reason(const GroundFigures& figures);
 // first: at which horizon it is largest, and from when on in the log, where one half holds it.
 std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search,
                               const std::vector<double>& horizons_s);
+
+// "Run 3 misses by 12 times as much as the others.", one sentence a run; empty: none.
+std::string text_of_odd_runs(const GroundSearch& search, const std::vector<FarRun>& odd);
+
+// "These runs do not show whether these are right: the distance between the sides.", of values that
+// the log leaves as unsure as they were before it; empty: there are none.
+std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& search,
+                             std::uint64_t seed);
 
 // Values that would move most, each more than two of its tolerances, were all of them free; empty:
 // none.  "separation by -3.1 %, lag by +0.05 s".

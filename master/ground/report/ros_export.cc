@@ -208,7 +208,7 @@ std::string ros_yaml(const RosExport& data) {
   for (const RosValue& row : data.values) {
     text += row.known ? fmt::format("    {}: {:.6g}  # [{:.4g}, {:.4g}]; you had {:.6g}\n", row.key,
                                     row.reported, row.interval.lower, row.interval.upper, row.had)
-                      : fmt::format("    {}: {:.6g}  # as you have it: the log says no other\n",
+                      : fmt::format("    {}: {:.6g}  # as you have it: the log shows no other\n",
                                     row.key, row.had);
   }
   for (const std::string& remark : data.remarks) text += "    # " + remark + "\n";

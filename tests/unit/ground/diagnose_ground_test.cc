@@ -170,6 +170,56 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
   }
 }
 
+TEST(DiagnoseGround, ARunThatIsTheOtherWayRoundAloneIsNamed) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog log = driven(robot, {});
+  for (PoseRow& row : log.runs[2].poses) {
+    row.X_WM = {row.X_WM.x, -row.X_WM.y, wrap_angle(-row.X_WM.theta)};
+  }
+  const Diagnosis found = diagnosis_of(robot, log).diagnosis;
+  EXPECT_EQ(found.verdict, Verdict::kUnknown) << found.headline;
+  EXPECT_NE(found.headline.find("Run 3 misses"), std::string::npos) << found.headline;
+  for (const std::string& caution : found.cautions) {
+    EXPECT_EQ(caution.find("clocks"), std::string::npos) << caution;
+  }
+}
+
+// Straight on nothing shows how far apart the sides are; a robot that stands shows nothing at all.
+TEST(DiagnoseGround, ReportsWhatTheLogCannotShow) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog standing = driven(robot, {});
+  EXPECT_EQ(diagnosis_of(robot, standing).diagnosis.headline.find("do not show"),
+            std::string::npos);
+  for (LoggedRun& run : standing.runs) {
+    for (CommandRow& row : run.commands) row.values = {0, 0};
+    const Pose still = run.poses.front().X_WM;
+    Stream stream({3, Purpose::kTest, 0, 0, 0});
+    for (PoseRow& row : run.poses) {
+      row.X_WM =
+          still * Pose{3e-4 * stream.normal(), 3e-4 * stream.normal(), 1e-3 * stream.normal()};
+    }
+  }
+  const Diagnosis found = diagnosis_of(robot, standing).diagnosis;
+  EXPECT_TRUE(found.effects.empty()) << found.headline;
+  EXPECT_NE(found.headline.find("do not show whether these are right"), std::string::npos);
+  EXPECT_NE(found.headline.find("the distance between the sides"), std::string::npos)
+      << found.headline;
+}
+
+// The robot drives by its own clock: what it takes for a second is one by the tracker's and a
+// little more, and so is the way that it goes meanwhile.
+TEST(DiagnoseGround, AClockThatIsSlowIsNoSmallerWheel) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog log = driven(robot, {});
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses) row.t_s *= 1.005;
+  }
+  const Diagnosis found = diagnosis_of(robot, log).diagnosis;
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  EXPECT_EQ(found.effects.front().name, "clock_drift");
+  expect_size(found.effects.front(), "rate", 0.005);
+}
+
 TEST(DiagnoseGround, LeavesOutWhatItIsReportedTo) {
   const GroundRobot robot = robot_of(kDifferential);
   GroundDiagnoseOptions options;

@@ -47,6 +47,21 @@ TEST(GroundVerdict, AGainWhoseIntervalHoldsZeroIsNoName) {
   EXPECT_TRUE(may_be_named({0.5, 0.1, 1}));
 }
 
+// Runs that miss by far more than others are no clean bill of health, whatever could be closed.
+TEST(GroundVerdict, AnOddRunIsNotNothing) {
+  GroundFigures figures = left(0, 0, 0);
+  EXPECT_EQ(ground_verdict(figures), Verdict::kNone);
+  figures.odd_runs = "Run 3 misses by 71 times as much as the others.";
+  EXPECT_EQ(ground_verdict(figures), Verdict::kUnknown);
+  EXPECT_NE(verdict_reason(figures).find("Run 3 misses by 71"), std::string::npos);
+}
+
+TEST(GroundVerdict, WhatIsToleratedIsNotCalledWrong) {
+  EXPECT_FALSE(something_is_left(left(0.027, 0.23, 0.4)));
+  EXPECT_NE(verdict_reason(left(0.027, 0.23, 0.4)).find("log more runs"), std::string::npos);
+  EXPECT_TRUE(something_is_left(left(0.027, 0.5, 0.9)));
+}
+
 TEST(GroundVerdict, ItsReasonHasItsFigures) {
   GroundFigures figures = left(1.6, 2.9, 4.2);
   figures.best_of_all = "floor_edge";

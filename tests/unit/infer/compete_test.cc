@@ -223,6 +223,65 @@ TEST(InferCompete, NothingIsGainedWhereNothingActs) {
   for (const Contender& c : contest->contenders) EXPECT_LT(c.gain, kLeastPromise);
 }
 
+// Drives end elsewhere where they cross a disc, in jumps as wide as a step of the simulation:
+// slopes are 0 or tell of one jump, and the search without them finds the disc's place.
+TEST(InferCompete, FindsAPlaceWhereSlopesAreOfNoUse) {
+  constexpr double kStep_m = 0.05, kRadius_m = 0.2;
+  const auto inside = [](std::size_t i, const Overrides& at) {
+    const double across = 0.03 * static_cast<double>(i % 30) - 0.4;
+    const double off = across - value(at, i < 30 ? "friction_patch.x" : "friction_patch.y");
+    return std::floor(std::max(0.0, kRadius_m - std::abs(off)) / kStep_m) * kStep_m;
+  };
+  const Forward f = [&](const std::vector<PredictionRequest>& points)
+      -> Result<std::vector<std::optional<std::vector<Pose>>>> {
+    std::vector<std::optional<std::vector<Pose>>> all;
+    for (const PredictionRequest& point : points) {
+      std::vector<Pose>& ends = all.emplace_back().emplace();
+      const bool some = !point.trials.empty();
+      for (std::size_t k = 0; k < (some ? point.trials.size() : kObservations); ++k) {
+        const double less = 1 - value(point.at, "friction_patch.ratio");
+        ends.push_back({less * inside(some ? point.trials[k] : k, point.at), 0, 0});
+      }
+    }
+    return all;
+  };
+  const auto disc = [](double x, double y) {
+    return Overrides{{row("friction_patch.x"), x},
+                     {row("friction_patch.y"), y},
+                     {row("friction_patch.ratio"), 0.5}};
+  };
+  const double x = 0.031, y = -0.043;
+  Observations o = observed({});
+  for (std::uint32_t i = 0; i < kObservations; ++i) {
+    o.measured[i] = (**f({{disc(x, y), {i}}})->begin())[0] * Pose{0, kNoise * (i % 3 - 1.0), 0};
+  }
+  Hypothesis patch;
+  patch.name = "friction_patch";
+  for (const char* key : {"friction_patch.x", "friction_patch.y"}) {
+    Coordinate& c = patch.coordinates.emplace_back();
+    c.row = row(key);
+    c.size = 0.05;
+  }
+  patch.from_neutral = false;
+  patch.starts = {{disc(x + 0.09, y - 0.08), {}}};
+  const auto found = [&](const Hypothesis& h) {
+    const auto contest = compete(f, o, base_of(f, o), {h}, {Effort::kLocal, {}, 1}, nullptr);
+    const Model& model = contest.value().contenders.at(0).model;
+    return model.space.values(model.fit.u);
+  };
+  patch.promised = 1e6;
+  patch.touched = [&](const Overrides& at) {
+    std::vector<std::uint32_t> touched;
+    for (std::uint32_t i = 0; i < kObservations; ++i) {
+      if (inside(i, at) > 0) touched.push_back(i);
+    }
+    return touched;
+  };
+  const Overrides at = found(patch);
+  EXPECT_NEAR(at.at(row("friction_patch.x")), x, 0.02);
+  EXPECT_NEAR(at.at(row("friction_patch.y")), y, 0.02);
+}
+
 // What the world's frame is must not matter: a quarter turn of the cause turns the answer.
 TEST(InferCompete, TurnsWithTheCause) {
   const Forward f = forward();
