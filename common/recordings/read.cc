@@ -129,7 +129,8 @@ std::size_t add_poses(const std::vector<CommandRow>& rows, bool increments, Logg
   std::size_t repeated = 0;
   Pose X_WM;
   for (const CommandRow& row : rows) {
-    const Pose read{row.values[0], row.values[1], wrap_angle(row.values[2])};
+    // As it stands: of degrees a wrapped heading leaves nothing.
+    const Pose read{row.values[0], row.values[1], row.values[2]};
     // The first one's is from a pose that nobody has.
     X_WM = !increments ? read : run->poses.empty() ? Pose() : X_WM * read;
     std::optional<Eigen::Matrix3d> noise;

@@ -16,7 +16,8 @@ namespace gapfarm {
 // Errors name file, line and column, what was found and what was expected: a column that is
 // missing, a number that is not one, times that go back within a run, a run with poses and no
 // commands, a covariance that is none, a turn of more than half a turn in one increment.  Noted: a
-// run with commands and no poses, poses at the time of the one before.
+// run with commands and no poses, poses at the time of the one before.  Headings of the world keep
+// their full turns: whoever takes them for radians wraps them.
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels);
 

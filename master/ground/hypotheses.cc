@@ -43,7 +43,7 @@ std::function<void(RunLog*)> change_commands(CommandChange change) {
 std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn = 0) {
   const auto changed = [L, turn](const Pose& X) {
     const Eigen::Vector3d v = L * Eigen::Vector3d(X.x, X.y, X.theta);
-    return Pose{v[0], v[1], wrap_angle(v[2] - turn)};
+    return Pose{v[0], v[1], turn == 0 ? v[2] : wrap_angle(v[2] - turn)};
   };
   return [L, changed](RunLog* log) {
     for (LoggedRun& run : log->runs) {

@@ -66,7 +66,7 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
     // Densities are of what was logged, in its own unit.
     fault.objective =
         WindowFitter(robot, *windows, reference).hold(rows, nominals(rows)).objective +
-        2 * stretches * std::log(catalogue[i].metres);
+        stretches * std::log(catalogue[i].metres * catalogue[i].metres * catalogue[i].radians);
     fault.gain = fault.objective - before;
     fault.shrinks = std::exp(fault.gain / (3 * stretches));
     if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;

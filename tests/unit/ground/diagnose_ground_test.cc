@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <tuple>
 
 #include "tests/unit/ground/driven_log.h"
 
@@ -158,6 +160,7 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
          X.x *= 1000;
          X.y *= 1000;
        })},
+      {"heading_unit", poses([](Pose& X) { X.theta *= 180 / std::numbers::pi; })},
   };
   for (const auto& [name, log] : cases) {
     const auto findings = check_ground_log(robot, log);
