@@ -21,6 +21,11 @@ namespace gapfarm {
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels);
 
+// Whether a run's poses and commands are of one clock, in one unit of time, as far as one can see:
+// apart by more than what delays may be, or one of them a thousandfold, they are not.  `where`: the
+// file, for the error.
+Status check_times(const LoggedRun& run, const std::string& where);
+
 // wheels.csv: measured wheel speeds (rad/s) of the log's runs, a column a wheel.  Runs that it does
 // not have keep none.  Errors: as read_runs(); other wheels than the log has already.
 Status read_wheel_speeds(const std::string& path, RunLog* log);

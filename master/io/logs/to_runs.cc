@@ -10,6 +10,7 @@
 #include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/text/csv.h"
+#include "common/recordings/read.h"
 
 namespace gapfarm {
 namespace {
@@ -56,6 +57,10 @@ class Importer {
     for (const Kind& kind : {kinds()[0], kinds()[1]}) {
       if (!kind.map->columns.empty() && tallies_[kind.name].taken == 0) return none_found(kind);
     }
+    for (const LoggedRun& logged : out_.log.runs) {
+      RETURN_IF_ERROR(check_times(logged, recordings_.front().file));
+    }
+    shift_clocks();
     assemble();
     report();
     return std::move(out_);
@@ -283,7 +288,6 @@ class Importer {
         log.runs.push_back(std::move(run));
       }
     }
-    shift_clocks();
   }
 
   static double first_time(const LoggedRun& run) {
