@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/files.h"
@@ -14,6 +15,10 @@
 
 namespace gapfarm {
 namespace {
+
+constexpr double kClocksApart_s = 11;  // as diagnoses allow delays, both ways
+constexpr double kThousand = 300;      // milliseconds for seconds, whatever else differs
+constexpr std::size_t kRowsAlike = 10;
 
 // A session and a run in it.
 using RunKey = std::pair<std::string, std::string>;
@@ -129,7 +134,8 @@ std::size_t add_poses(const std::vector<CommandRow>& rows, bool increments, Logg
   std::size_t repeated = 0;
   Pose X_WM;
   for (const CommandRow& row : rows) {
-    const Pose read{row.values[0], row.values[1], wrap_angle(row.values[2])};
+    // As it stands: of degrees a wrapped heading leaves nothing.
+    const Pose read{row.values[0], row.values[1], row.values[2]};
     // The first one's is from a pose that nobody has.
     X_WM = !increments ? read : run->poses.empty() ? Pose() : X_WM * read;
     std::optional<Eigen::Matrix3d> noise;
@@ -157,6 +163,27 @@ std::string name_of(const RunKey& key) {
 
 }  // namespace
 
+Status check_times(const LoggedRun& run, const std::string& where) {
+  if (run.commands.empty() || run.poses.empty()) return {};
+  const double a = run.commands.front().t_s, b = run.commands.back().t_s;
+  const double c = run.poses.front().t_s, d = run.poses.back().t_s;
+  // Logs of one drive that have about as many rows last about as long.
+  const auto longer = [](double one_s, std::size_t rows, double other_s, std::size_t others) {
+    return one_s > kThousand * other_s && rows < kRowsAlike * others && others < kRowsAlike * rows;
+  };
+  const std::size_t rows = run.commands.size(), poses = run.poses.size();
+  const bool apart = c > b + kClocksApart_s || d < a - kClocksApart_s;
+  const bool unit = longer(b - a, rows, d - c, poses) || longer(d - c, poses, b - a, rows);
+  if (!apart && !(unit && rows > 2 && poses > 2)) return {};
+  const auto span = [](double from, double end) {
+    return formatted("%.2f to ", from) + formatted("%.2f s", end);
+  };
+  return Error{where + ": found poses of run " + quoted_word(name_of({run.session, run.run})) +
+               " from " + span(c, d) + " and its commands from " + span(a, b) +
+               ", expected one clock for both; does one of them count from another start, or in "
+               "milliseconds? Write both in s since the same moment"};
+}
+
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels) {
   ASSIGN_OR_RETURN(const auto commands, RunTable::read(commands_path, channels, "a command log"));
@@ -178,6 +205,7 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
     run.run = key.second;
     run.commands = commands.of(key);
     const std::size_t repeated = add_poses(poses.of(key), log.relative, &run);
+    RETURN_IF_ERROR(check_times(run, poses_path));
     if (repeated > 0 && !log.relative) {
       log.notes.push_back(poses_path + ": run " + quoted_word(name_of(key)) + ": " +
                           std::to_string(repeated) + " poses at the time of the one before");

@@ -16,9 +16,15 @@ namespace gapfarm {
 // Errors name file, line and column, what was found and what was expected: a column that is
 // missing, a number that is not one, times that go back within a run, a run with poses and no
 // commands, a covariance that is none, a turn of more than half a turn in one increment.  Noted: a
-// run with commands and no poses, poses at the time of the one before.
+// run with commands and no poses, poses at the time of the one before.  Headings of the world keep
+// their full turns: whoever takes them for radians wraps them.
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels);
+
+// Whether a run's poses and commands are of one clock, in one unit of time, as far as one can see:
+// apart by more than what delays may be, or one of them a thousandfold, they are not.  `where`: the
+// file, for the error.
+Status check_times(const LoggedRun& run, const std::string& where);
 
 // wheels.csv: measured wheel speeds (rad/s) of the log's runs, a column a wheel.  Runs that it does
 // not have keep none.  Errors: as read_runs(); other wheels than the log has already.

@@ -92,6 +92,7 @@ class Cutter {
     trial.duration_s = run.poses[end].t_s - run.poses[from].t_s;
     trial.X_WS = run.poses[from].X_WM;
     trial.X_WE = run.poses[end].X_WM;
+    for (Pose* X : {&trial.X_WS, &trial.X_WE}) X->theta = wrap_angle(X->theta);
     to_.log.trials.push_back(std::move(trial));
   }
 

@@ -43,7 +43,7 @@ std::function<void(RunLog*)> change_commands(CommandChange change) {
 std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn = 0) {
   const auto changed = [L, turn](const Pose& X) {
     const Eigen::Vector3d v = L * Eigen::Vector3d(X.x, X.y, X.theta);
-    return Pose{v[0], v[1], wrap_angle(v[2] - turn)};
+    return Pose{v[0], v[1], turn == 0 ? v[2] : wrap_angle(v[2] - turn)};
   };
   return [L, changed](RunLog* log) {
     for (LoggedRun& run : log->runs) {
@@ -101,6 +101,24 @@ class Catalogue {
   std::vector<KinematicRow> rows_;
 };
 
+// `alias`: what else makes all motions larger than commanded.
+struct CommandUnit {
+  CommandKind of;
+  bool turns;
+  const char *thing, *name;
+  double factor;
+  const char* alias;
+};
+
+constexpr CommandKind kWheels = CommandKind::kWheelSpeeds, kTwists = CommandKind::kTwist;
+constexpr CommandUnit kCommandUnits[] = {
+    {kWheels, true, "wheel speeds", "rpm", 2 * pi / 60, "wheel_radius"},
+    {kWheels, true, "wheel speeds", "degrees a second", pi / 180, "wheel_radius"},
+    {kWheels, true, "wheel speeds", "turns a second", 2 * pi, "wheel_radius"},
+    {kTwists, false, "commanded speeds", "km/h", 1 / 3.6, "pose_scale"},
+    {kTwists, false, "commanded speeds", "mm/s", 1e-3, "pose_scale"},
+    {kTwists, true, "commanded turns", "degrees a second", pi / 180, "turn_gain"}};
+
 void Catalogue::wrong_commands() {
   const auto pairs = channel_pairs(robot_);
   if (!pairs.empty()) {
@@ -129,16 +147,17 @@ void Catalogue::wrong_commands() {
           "Turn the sign of that column.",
           change_commands([c](std::vector<double>& v) { v[c] *= -1; }), 1, {"command_sign"});
   }
-  if (robot_.command != CommandKind::kWheelSpeeds) return;
-  for (const auto& [unit, factor] : {std::pair{"rpm", 2 * pi / 60},
-                                     {"degrees a second", pi / 180},
-                                     {"turns a second", 2 * pi}}) {
-    fault("unit_error", std::string("the unit of the wheel speeds: ") + unit,
-          std::string("Multiply them by ") + std::to_string(factor) + ".",
-          change_commands([f = factor](std::vector<double>& v) {
-            for (double& value : v) value *= f;
+  for (const CommandUnit& unit : kCommandUnits) {
+    if (unit.of != robot_.command) continue;
+    const auto of_it = mapped(robot_.channels, [&](const std::string& channel) {
+      return unit.of != CommandKind::kTwist || unit.turns == (channel == "omega");
+    });
+    fault("unit_error", std::string("the unit of the ") + unit.thing + ": " + unit.name,
+          std::string("Multiply them by ") + std::to_string(unit.factor) + ".",
+          change_commands([f = unit.factor, of_it](std::vector<double>& v) {
+            for (std::size_t c = 0; c < v.size(); ++c) v[c] *= of_it[c] ? f : 1;
           }),
-          1, {"command_units", "wheel_radius"});
+          1, {"command_units", unit.alias});
   }
 }
 

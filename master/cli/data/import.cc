@@ -82,6 +82,12 @@ void drive_by_wheels(LogMap& map) {
 Status check_map(const LogMap& map, const std::vector<Recording>& recordings) {
   const bool poses = !map.poses.columns.empty(), commands = !map.commands.columns.empty();
   if (poses && commands) return {};
+  if (!poses && !map.no_heading.empty()) {
+    return Error{map.no_heading +
+                 ":1: found x and y and no heading, expected theta (or yaw, "
+                 "heading; rad, or degrees as theta_deg) or qx, qy, qz, qw beside them; a "
+                 "column of another name needs a map (--print-map)"};
+  }
   return Error{recordings.front().file + ":1: found no columns that are clearly " +
                (poses      ? "commands"
                 : commands ? "poses"

@@ -128,9 +128,10 @@ void GroundReport::faults() {
     const double shrinks = std::exp(effect.gap_before / 3);
     effect.text = fmt::format(
         "The log is wrong in {}: put right, what {} expects is {:.1f} times as near to what was "
-        "measured. {}",
-        h.thing, source_of(robot_), shrinks, h.remedy);
+        "measured.",
+        h.thing, source_of(robot_), shrinks);
     d_.sanity.push_back({h.name, effect.text, h.remedy, Severity::kNote, true, effect.aliases});
+    effect.text += " " + h.remedy;
     d_.effects.push_back(std::move(effect));
   }
 }

@@ -308,8 +308,7 @@ bool to_pose(const TableMap& map, std::vector<double>& values) {
     if (y_up) std::tie(y, z) = std::pair(-z, y);
     theta = std::atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
   }
-  std::vector<double> pose = {value("t"), value("x"), y_up ? -value("z") : value("y"),
-                              wrap_angle(theta)};
+  std::vector<double> pose = {value("t"), value("x"), y_up ? -value("z") : value("y"), theta};
   for (const std::string& role : map.noise()) pose.push_back(value(role));
   values = std::move(pose);
   return true;

@@ -42,6 +42,7 @@ struct TableMap {
 struct LogMap {
   TableMap poses, commands, wheels, gyro;  // no columns: the recording has none
   std::vector<std::string> notes;          // why a guess is what it is
+  std::string no_heading;                  // the first table that has x and y and no heading
 };
 
 // Factor to SI of a unit ("mm", "deg", "ns", "rpm", ...), 0 when nobody knows it.

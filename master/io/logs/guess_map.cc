@@ -129,6 +129,14 @@ bool has_word(const std::string& name, const std::string& word) {
   return false;
 }
 
+// The unit in "v [km/h]" or "v (km/h)", where it is known.
+std::string unit_in_name(const std::string& name) {
+  const std::size_t from = name.find_first_of("[("), end = name.find_first_of("])");
+  if (from == name.npos || end == name.npos || end < from) return "";
+  const std::string unit = name.substr(from + 1, end - from - 1);
+  return !unit.empty() && unit_factor(unit) != 0 ? unit : "";
+}
+
 class Guess {
  public:
   explicit Guess(const std::vector<Recording>& recordings) : recordings_(recordings) {}
@@ -195,7 +203,9 @@ class Guess {
       quaternion = quaternion && found.find(part) != nullptr;
     }
     const bool place = found.find("x") != nullptr && found.find("y") != nullptr;
-    if (!place || (!quaternion && found.find("theta") == nullptr)) return;
+    const bool heading = quaternion || found.find("theta") != nullptr;
+    if (place && !heading && map_.no_heading.empty()) map_.no_heading = table.source;
+    if (!place || !heading) return;
     if (table.type == "motive") found.up = "y";
     found.keep = column_of(table, kKeep);
     auto& columns = found.columns;
@@ -230,6 +240,9 @@ class Guess {
       }
       if (found.columns.size() != set.size() + 1) continue;
       for (MappedColumn& c : found.columns) {
+        if (c.role == "t" || stated(table, c.column)) continue;
+        c.unit = unit_in_name(c.column);
+        if (!c.unit.empty()) continue;
         if (c.role == "omega") c.unit = rate_unit(table, c.column);
         const bool rim = c.role == "left" || c.role == "right" || c.role == "speed";
         if (rim) c.unit = rim_unit(table, c.column);

@@ -108,4 +108,14 @@ RunFiles format_runs(const RunLog& log) {
   return files;
 }
 
+std::string LogTable::unit_of(std::string_view name) const {
+  const auto at = find(name);
+  if (!at || *at >= units.size()) return "";
+  std::string unit = units[*at].text;
+  if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) {
+    unit = unit.substr(1, unit.size() - 2);
+  }
+  return unit;
+}
+
 }  // namespace gapfarm

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <ctime>
 #include <limits>
 
 #include "common/base/try.h"
@@ -12,11 +14,25 @@ namespace gapfarm {
 namespace {
 
 constexpr double kBlank = std::numeric_limits<double>::quiet_NaN();
+// 2026-01-31T12:00:00.5Z or ...+01:00 as seconds since 1970; without a zone it is taken for UTC.
+std::optional<double> iso_time(std::string text) {
+  std::tm at{}, zone{};
+  if (text.size() > 10 && text[10] == 'T') text[10] = ' ';
+  const char* rest = strptime(text.c_str(), "%Y-%m-%d %H:%M:%S", &at);
+  char* end = nullptr;
+  const double part = rest != nullptr && *rest == '.' ? std::strtod(rest, &end) : 0;
+  if (end != nullptr) rest = end;
+  if (rest != nullptr && *rest != 0) rest = strptime(rest, "%z", &zone);
+  if (rest == nullptr || *rest != 0) return {};
+  return static_cast<double>(timegm(&at) - zone.tm_gmtoff) + part;
+}
+
 // Words in cells that mean true or nothing; other words make a column one of words.
 double number_of(const std::string& text, char separator = ',') {
   if (const auto value = parse_decimal(text, separator)) {
     return std::isfinite(*value) ? *value : kBlank;
   }
+  if (const auto time = iso_time(text)) return *time;
   if (text == "true" || text == "True") return 1;
   if (text == "false" || text == "False") return 0;
   return kBlank;
@@ -379,16 +395,6 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
                    [&](const CsvField& f) { return parse_decimal(f.text, separator).has_value(); });
   return headed ? parse_headed(std::move(rows), file, separator)
                 : parse_echo(rows, file, separator);
-}
-
-std::string LogTable::unit_of(std::string_view name) const {
-  const auto at = find(name);
-  if (!at || *at >= units.size()) return "";
-  std::string unit = units[*at].text;
-  if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) {
-    unit = unit.substr(1, unit.size() - 2);
-  }
-  return unit;
 }
 
 }  // namespace gapfarm

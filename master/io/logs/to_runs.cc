@@ -7,8 +7,10 @@
 #include <set>
 
 #include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
+#include "common/recordings/read.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -49,14 +51,16 @@ class Importer {
 
   Result<ImportedRuns> run() {
     for (std::size_t i = 0; i < recordings_.size(); ++i) {
-      for (const Kind& kind : kinds()) {
-        if (Status s = take(i, kind); !s) return s.error();
-      }
+      for (const Kind& kind : kinds()) RETURN_IF_ERROR(take(i, kind));
     }
     for (const Kind& kind : {kinds()[0], kinds()[1]}) {
       if (!kind.map->columns.empty() && tallies_[kind.name].taken == 0) return none_found(kind);
     }
     assemble();
+    for (const LoggedRun& logged : out_.log.runs) {
+      RETURN_IF_ERROR(check_times(logged, recordings_.front().file));
+    }
+    shift_clocks();
     report();
     return std::move(out_);
   }
@@ -74,15 +78,26 @@ class Importer {
                        [&](const MappedColumn& c) { return table.find(c.column).has_value(); });
   }
 
+  static bool has_number(const LogTable& table, const std::string& column) {
+    const std::size_t at = *table.find(column);
+    for (std::size_t r = 0; r < table.rows(); ++r) {
+      if (std::isfinite(table.at(r, at))) return true;
+    }
+    return false;
+  }
+
   Error none_found(const Kind& kind) const {
     std::string there;
     for (const Recording& recording : recordings_) {
       for (const LogTable& table : recording.tables) {
-        if (there.size() > 600) break;
-        there += (there.empty() ? "" : "; ") + table.source + ": ";
-        for (std::size_t i = 0; i < table.columns.size(); ++i) {
-          there += (i == 0 ? "" : ", ") + table.columns[i];
+        for (const MappedColumn& c : kind.map->columns) {
+          if (!has_all(table, *kind.map) || has_number(table, c.column)) continue;
+          return Error{table.source + ":1: found no number in column " + quoted_word(c.column) +
+                       ", expected " + c.role + " of the " + kind.name +
+                       (c.role == "t" ? " as seconds, or as 2026-01-31T12:00:00.5Z" : "")};
         }
+        if (there.size() > 600) break;
+        there += (there.empty() ? "" : "; ") + table.source + ": " + joined(table.columns, ", ");
       }
     }
     return Error{recordings_.front().file + ":1: found no " + kind.name +
@@ -283,7 +298,6 @@ class Importer {
         log.runs.push_back(std::move(run));
       }
     }
-    shift_clocks();
   }
 
   static double first_time(const LoggedRun& run) {
@@ -323,9 +337,9 @@ class Importer {
     out_.clock_start_s = std::floor(first);
     for (LoggedRun& run : out_.log.runs) {
       for (PoseRow& row : run.poses) row.t_s -= out_.clock_start_s;
-      for (CommandRow& row : run.commands) row.t_s -= out_.clock_start_s;
-      for (CommandRow& row : run.wheel_speeds) row.t_s -= out_.clock_start_s;
-      for (CommandRow& row : run.yaw_rates) row.t_s -= out_.clock_start_s;
+      for (auto* rows : {&run.commands, &run.wheel_speeds, &run.yaw_rates}) {
+        for (CommandRow& row : *rows) row.t_s -= out_.clock_start_s;
+      }
     }
   }
 
@@ -335,12 +349,9 @@ class Importer {
       const Tally& tally = tallies_[kind.name];
       std::string line = "took: " + std::to_string(tally.taken) + " " + kind.name;
       if (!kind.map->source.empty()) line += " of " + kind.map->source;
-      line += " (";
-      for (std::size_t i = 0; i < kind.map->columns.size(); ++i) {
-        line += (i == 0 ? "" : ", ") + kind.map->columns[i].column;
-      }
-      line += ")";
-      out_.report.push_back(line);
+      out_.report.push_back(
+          line + " (" +
+          joined(kind.map->columns, ", ", [](const MappedColumn& c) { return c.column; }) + ")");
       if (tally.dropped > 0) {
         out_.report.push_back("left: " + std::to_string(tally.dropped) + " rows of " + kind.name +
                               " where " + kind.map->keep + " is 0");

@@ -115,6 +115,23 @@ TEST(TextLogs, PlotJugglerLeavesBlanks) {
        "10.01,,,,,,,0.1,0\n10.1,1.1,2,0,0,0.295520207,0.955336489,,\n10.11,,,,,,,0.3,-0.2\n"}));
 }
 
+TEST(TextLogs, UnitsInNamesAndTimesOfDay) {
+  expect_the_drive(
+      read({"t,v [km/h],w (deg/s)\n2026-01-31T12:00:10Z,0.36,0\n"
+            "2026-01-31 13:00:10.1+01:00,1.08,-11.4591559\n",
+            "t,x,y,theta\n2026-01-31T12:00:10,1,2,0.5\n2026-01-31T12:00:10.100,1.1,2,0.6\n"}));
+  const std::string no_time = "t,v,w\n12 o'clock,1,1\n";
+  EXPECT_THAT(read({no_time, "t,x,y,theta\n1,1,1,1\n"}).runs.error().message,
+              HasSubstr("f0.csv:1: found no number in column 't'"));
+  EXPECT_EQ(read({kTwists, "t,x,y\n10,1,2\n"}).map.no_heading, "f1.csv");
+}
+
+TEST(TextLogs, PosesOnAnotherClockAreRefused) {
+  const Read r = read({kTwists, "t,x,y,theta\n1600000010,1,2,0.5\n1600000011,1.1,2,0.6\n"});
+  ASSERT_FALSE(r.runs);
+  EXPECT_THAT(r.runs.error().message, HasSubstr("expected one clock"));
+}
+
 // y is up: the floor's y is -z, and a turn about y is a heading.
 TEST(TextLogs, MotiveIsYUp) {
   expect_the_drive(

@@ -113,7 +113,7 @@ TEST_F(Runs, AreReadByRun) {
   ASSERT_TRUE(log.ok()) << log.error().message;
   ASSERT_EQ(log->runs.size(), 2u);
   EXPECT_EQ(log->runs[0].commands[0].values, (std::vector<double>{1, 2}));
-  EXPECT_NEAR(log->runs[0].poses[1].X_WM.theta, 7 - 2 * 3.14159265358979, 1e-9);
+  EXPECT_EQ(log->runs[0].poses[1].X_WM.theta, 7);  // perhaps degrees
   EXPECT_EQ(log->runs[1].run, "2");
 }
 
@@ -122,6 +122,28 @@ TEST_F(Runs, TimesThatGoBackAreNamedByPlace) {
                              write("p.csv", "run,t,x,y,theta\n1,0,0,0,0\n"), channels_);
   ASSERT_FALSE(log.ok());
   EXPECT_NE(log.error().message.find("c.csv:3:3"), std::string::npos) << log.error().message;
+}
+
+TEST_F(Runs, PosesOnAnotherClockThanTheirCommandsAreRefused) {
+  const auto error_of = [&](double start_s, double unit) {
+    std::string commands = "run,t,left,right\n", poses = "run,t,x,y,theta\n";
+    for (int i = 0; i < 40; ++i) {
+      commands += "1," + std::to_string(i) + ",1,1\n";
+      poses += "1," + std::to_string(start_s + unit * i) + ",0,0,0\n";
+    }
+    const auto log = read_runs(write("c.csv", commands), write("p.csv", poses), channels_);
+    return log ? std::string() : log.error().message;
+  };
+  EXPECT_EQ(error_of(0, 1), "");
+  EXPECT_EQ(error_of(-45, 1), "");  // it begins before its commands, and clocks are a little apart
+  EXPECT_EQ(error_of(45, 1), "");
+  EXPECT_EQ(error_of(0, 60), "");  // a pose a minute
+  for (const double late_s : {1.7e9, 60.0, -60.0}) EXPECT_NE(error_of(late_s, 1), "") << late_s;
+  EXPECT_NE(error_of(0, 1e-3), "");
+  const std::string ms = error_of(0, 1000);
+  for (const char* part : {"'1'", "0.00 to 39000.00 s", "0.00 to 39.00 s", "milliseconds"}) {
+    EXPECT_NE(ms.find(part), std::string::npos) << ms;
+  }
 }
 
 TEST_F(Runs, ARunWithoutCommandsIsRefused) {
