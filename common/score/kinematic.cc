@@ -116,9 +116,9 @@ class Body {
   Pose observed(const Pose& X) const { return {scale_ * X.x, scale_ * aspect_ * X.y, X.theta}; }
   Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
 
-  // The commands as this robot takes them: later by a clock that drifts, as fast by the tracker's
-  // clock as by its own where that is what drifts, weaker by a battery that sags; both counted from
-  // `began_s`.  In `changed` where they are not those of the log.
+  // The commands as this robot takes them: later by a clock that drifts, slower where that is its
+  // own, weaker by a battery that sags; all counted from `began_s`.  In `changed` where they are
+  // not those of the log.
   std::span<const CommandRow> taken(std::span<const CommandRow> logged, double began_s,
                                     std::vector<CommandRow>* changed) const {
     if (sag_ == 0 && drift_ == 0 && rate_ == 0) return logged;

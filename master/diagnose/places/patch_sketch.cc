@@ -86,7 +86,10 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study)
     for (int k = 0; k < kSteps; ++k) {
       driven.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
       driven.contacts.push_back(contacts_at(trial.X_WS * exp(Twist(whole * (k + 0.5) / kSteps))));
-      for (const Eigen::Vector2d& contact : driven.contacts.back()) driven.around.extend(contact);
+      for (const Eigen::Vector2d& contact : driven.contacts.back()) {
+        driven.low = driven.low.cwiseMin(contact.array());
+        driven.high = driven.high.cwiseMax(contact.array());
+      }
     }
   }
   for (double ratio : kRatios) shifts_.push_back(shifts(ratio));
@@ -187,10 +190,9 @@ PatchSketch::Contacts PatchSketch::contacts_at(const Pose& X_WB) const {
 // Of the end, in the predicted end's axes.
 Eigen::Vector3d PatchSketch::shift_of(const DrivenPath& driven, const Patch& patch,
                                       const Shifts& shifts) const {
-  const Eigen::Vector2d centre(patch[0], patch[1]);
-  if (driven.around.squaredExteriorDistance(centre) >= patch[2] * patch[2]) {
-    return Eigen::Vector3d::Zero();
-  }
+  const Eigen::Array2d centre(patch[0], patch[1]);
+  const Eigen::Array2d off = (driven.low - centre).cwiseMax(centre - driven.high).cwiseMax(0.0);
+  if (off.matrix().squaredNorm() >= patch[2] * patch[2]) return Eigen::Vector3d::Zero();
   std::size_t k = 0;
   while (k < kSteps) {
     const unsigned set = inside(driven.contacts[k], patch);

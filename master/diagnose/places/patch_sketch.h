@@ -3,8 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "common/pose/pose.h"
@@ -45,9 +45,9 @@ class PatchSketch {
     Twist step = Twist::Zero();
     Pose half, whole;  // exp() of half of it, and of it
     Pose X_WE;
-    std::vector<Pose> X_WB;          // where each step begins
-    std::vector<Contacts> contacts;  // in its middle
-    Eigen::AlignedBox2d around;      // all of these
+    std::vector<Pose> X_WB;                                                // where each step begins
+    std::vector<Contacts> contacts;                                        // in its middle
+    Eigen::Array2d low = Eigen::Array2d::Constant(INFINITY), high = -low;  // of all of these
   };
   using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
   Contacts contacts_at(const Pose& X_WB) const;

@@ -221,42 +221,43 @@ TEST(DiagnoseGround, AClockThatIsSlowIsNoSmallerWheel) {
   ASSERT_EQ(found.effects.size(), 1u) << found.headline;
   EXPECT_EQ(found.effects.front().name, "clock_drift");
   expect_size(found.effects.front(), "rate", 0.005);
+}
 
-  TEST(DiagnoseGround, FindsTheUnitOfCommandedTwists) {
-    const GroundRobot robot = robot_of(
-        "drive = \"differential\"\nwheel_separation = 0.3\n"
-        "commands = [\"v\", \"omega\"]\n");
-    RunLog right = driven(robot_of(kDifferential), {});
-    right.channels = robot.channels;
-    for (LoggedRun& run : right.runs) {
-      for (CommandRow& row : run.commands) {
-        const double left = 0.05 * row.values[0], other = 0.05 * row.values[1];
-        row.values = {(left + other) / 2, (other - left) / 0.3};
-      }
-    }
-    EXPECT_TRUE(check_ground_log(robot, right).empty());
-    const std::tuple<std::size_t, double, const char*> cases[] = {
-        {0, 3.6, "km/h"}, {0, 1000, "mm/s"}, {1, 180 / std::numbers::pi, "degrees a second"}};
-    for (const auto& [channel, factor, unit] : cases) {
-      RunLog log = right;
-      for (LoggedRun& run : log.runs) {
-        for (CommandRow& row : run.commands) row.values[channel] *= factor;
-      }
-      const auto findings = check_ground_log(robot, log);
-      ASSERT_EQ(findings.size(), 1u) << unit;
-      EXPECT_EQ(findings.front().name, "unit_error");
-      EXPECT_NE(findings.front().text.find(unit), std::string::npos) << findings.front().text;
+TEST(DiagnoseGround, FindsTheUnitOfCommandedTwists) {
+  const GroundRobot robot = robot_of(
+      "drive = \"differential\"\nwheel_separation = 0.3\n"
+      "commands = [\"v\", \"omega\"]\n");
+  RunLog right = driven(robot_of(kDifferential), {});
+  right.channels = robot.channels;
+  for (LoggedRun& run : right.runs) {
+    for (CommandRow& row : run.commands) {
+      const double left = 0.05 * row.values[0], other = 0.05 * row.values[1];
+      row.values = {(left + other) / 2, (other - left) / 0.3};
     }
   }
-
-  TEST(DiagnoseGround, LeavesOutWhatItIsReportedTo) {
-    const GroundRobot robot = robot_of(kDifferential);
-    GroundDiagnoseOptions options;
-    options.excluded = {"wheel_radius", "motor_lagg"};
-    const auto result = diagnose_ground(robot, driven(robot, {}), options);
-    ASSERT_FALSE(result.ok());
-    EXPECT_NE(result.error().message.find("motor_lagg"), std::string::npos);
+  EXPECT_TRUE(check_ground_log(robot, right).empty());
+  const std::tuple<std::size_t, double, const char*> cases[] = {
+      {0, 3.6, "km/h"}, {0, 1000, "mm/s"}, {1, 180 / std::numbers::pi, "degrees a second"}};
+  for (const auto& [channel, factor, unit] : cases) {
+    RunLog log = right;
+    for (LoggedRun& run : log.runs) {
+      for (CommandRow& row : run.commands) row.values[channel] *= factor;
+    }
+    const auto findings = check_ground_log(robot, log);
+    ASSERT_EQ(findings.size(), 1u) << unit;
+    EXPECT_EQ(findings.front().name, "unit_error");
+    EXPECT_NE(findings.front().text.find(unit), std::string::npos) << findings.front().text;
   }
+}
+
+TEST(DiagnoseGround, LeavesOutWhatItIsReportedTo) {
+  const GroundRobot robot = robot_of(kDifferential);
+  GroundDiagnoseOptions options;
+  options.excluded = {"wheel_radius", "motor_lagg"};
+  const auto result = diagnose_ground(robot, driven(robot, {}), options);
+  ASSERT_FALSE(result.ok());
+  EXPECT_NE(result.error().message.find("motor_lagg"), std::string::npos);
+}
 
 }  // namespace
 }  // namespace gapfarm

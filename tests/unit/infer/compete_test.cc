@@ -224,7 +224,7 @@ TEST(InferCompete, NothingIsGainedWhereNothingActs) {
 }
 
 // Drives end elsewhere where they cross a disc, in jumps as wide as a step of the simulation:
-// slopes are 0 or tell of one jump, and the search without them finds the disc's place.
+// slopes are 0 or of one jump, and the search without them finds the disc's place.
 TEST(InferCompete, FindsAPlaceWhereSlopesAreOfNoUse) {
   constexpr double kStep_m = 0.05, kRadius_m = 0.2;
   const auto inside = [](std::size_t i, const Overrides& at) {
