@@ -117,8 +117,7 @@ class Body {
   Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
 
   // The commands as this robot takes them: later by a clock that drifts, slower where that is its
-  // own, weaker by a battery that sags; all counted from `began_s`.  In `changed` where they are
-  // not those of the log.
+  // own, weaker by a battery that sags; from `began_s` on.  In `changed` unless they are the log's.
   std::span<const CommandRow> taken(std::span<const CommandRow> logged, double began_s,
                                     std::vector<CommandRow>* changed) const {
     if (sag_ == 0 && drift_ == 0 && rate_ == 0) return logged;
