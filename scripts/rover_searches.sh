@@ -3,12 +3,15 @@
 # in OUT/compared (gapfarm compare), and from convergence.csv the evaluations until each search's
 # median is within 1 % of the best value that any of them found.
 #
-#   scripts/rover_searches.sh OUT [BIN] [SEEDS]
+#   scripts/rover_searches.sh OUT [BIN] [SEEDS [EVALUATIONS [SEARCH]]]
+#
+# SEARCH: genetic, auto or local alone.
 set -eu
 out=${1:?usage: scripts/rover_searches.sh OUT [BIN] [SEEDS]}
 here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$(cd "${2:-$here/build/release/bin}" && pwd)
 seeds=${3:-3}
+evaluations=${4:-200}
 mkdir -p "$out"
 cd "$out"
 rover=$here/configs/rover
@@ -21,18 +24,15 @@ cat >compare.toml <<END
 [compare]
 config = "searched.toml"
 seeds = $seeds
-evaluations = 200
-[variants.genetic]
-optimiser.kind = "genetic"
-[variants.auto]
-optimiser.kind = "auto"
-[variants.local]
-optimiser.kind = "local"
-optimiser.local = "bobyqa"
+evaluations = $evaluations
 END
+for search in ${5:-genetic auto local}; do
+  printf '[variants.%s]\noptimiser.kind = "%s"\n' "$search" "$search" >>compare.toml
+  if [ "$search" = local ]; then echo 'optimiser.local = "bobyqa"' >>compare.toml; fi
+done
 "$bin/gapfarm" compare compare.toml --out compared
-awk -F, 'FNR == 1 { next }
+awk -F, -v most="$evaluations" 'FNR == 1 { next }
   FILENAME ~ /runs/ { if (best == "" || $4 > best) best = $4; next }
-  !($1 in at) { at[$1] = "more than 200" }
+  !($1 in at) { at[$1] = "more than " most }
   at[$1] ~ /more/ && $3 >= best - 0.01 * (best < 0 ? -best : best) { at[$1] = $2 }
   END { for (search in at) print search ": " at[search] }' compared/runs.csv compared/convergence.csv
