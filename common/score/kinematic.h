@@ -36,18 +36,17 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // stand: "travel" (ratio of all wheels), "steering_left" and "_right" (ratio of the table's angles
 // that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain), "dead_band" (the
 // command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of the command lost
-// a minute), "drift" (s that the
-// clock of whoever logs the commands loses a second), "rate" (the same of the robot's own clock, by
-// which it also drives), "grip" (of cars: logarithm of the
+// a minute), "drift" (s that the clock of whoever logs the commands loses a second), "rate" (the
+// same of the robot's own clock, by which it also drives), "grip" (of cars: logarithm of the
 // acceleration to the side that the floor holds, m/s^2) with "slip_angle" (rad, of the rear axle
-// there; in place of the file's understeer) and "grip_shape" (logarithm of the power p in
-// 1 / (1 + share^p)^(1/p), how sharply curvature falls where the grip ends), "pose_scale" and
-// "aspect" (of the tracker: all that it reports, its y over its x); "traction" (of omni and mecanum
-// wheels: what a robot that does not turn goes of its wheels' way, since rollers resist being
-// rolled aside; loaded wheels pull and drag more) with "load_x" and "load_y" (m: where the weight
-// stands on them); "edge_angle" (rad), "edge_offset" (m) and "edge_ratio": two floors.  Beyond the
-// line of points p with p (cos angle, sin angle) = offset, in the tracker's frame, a wheel travels
-// ratio times as far, of omni and mecanum wheels with that of the traction.
+// there; in place of the file's understeer) and "grip_shape" (logarithm of the power p in 1 / (1 +
+// share^p)^(1/p), how sharply curvature falls where the grip ends), "pose_scale" and "aspect" (of
+// the tracker: all that it reports, its y over its x); "traction" (of omni and mecanum wheels: what
+// a robot that does not turn goes of its wheels' way, since rollers resist being rolled aside;
+// loaded wheels pull and drag more) with "load_x" and "load_y" (m: where the weight stands on
+// them); "edge_angle" (rad), "edge_offset" (m) and "edge_ratio": two floors.  Beyond the line of
+// points p with p (cos angle, sin angle) = offset, in the tracker's frame, a wheel travels ratio
+// times as far, of omni and mecanum wheels with that of the traction.
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
                                  std::span<const Trial> trials, const Kinematics& kinematics);
 

@@ -203,14 +203,14 @@ Status Search::search_blindly(Runner* runner) const {
   const Eigen::VectorXd own = runner->fit.u.tail(runner->fit.u.size() - base.size());
   ASSIGN_OR_RETURN(const Fit without, fitter(base_).start(base));
   if (!std::isfinite(without.score)) return {};
-  Status failed;
+  Status predicted;
   const auto score = [&](const std::vector<double>& x) {
     const Eigen::VectorXd u =
         joined(base, Eigen::VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size())));
     const auto touched = within(scope_, h.touched(runner->space.values(u)));
-    if (touched.empty() || !failed) return without.score;
+    if (touched.empty() || !predicted) return without.score;
     const auto fit = fits.starts({u}, {runner->space}, {touched}, without.z);
-    if (!fit) failed = fit.error();
+    if (!fit) predicted = fit.error();
     return fit && std::isfinite(fit->front().score) ? fit->front().score : -1e300;
   };
   const auto listed = [&](const Eigen::VectorXd& bounds) {
@@ -221,7 +221,7 @@ Status Search::search_blindly(Runner* runner) const {
       climbed(score, kBlindSearch * static_cast<int>(own.size()), listed(own),
               listed(runner->space.lower().tail(own.size()).cwiseMax(own - far)),
               listed(runner->space.upper().tail(own.size()).cwiseMin(own + far)));
-  if (!failed) return failed;
+  if (!predicted) return predicted;
   auto fit = fits.start(joined(base, Eigen::VectorXd::Map(best.data(), own.size())));
   if (!fit) return fit.error();
   if (fit->score > runner->fit.score) runner->fit = std::move(*fit);

@@ -45,9 +45,10 @@ class PatchSketch {
     Twist step = Twist::Zero();
     Pose half, whole;  // exp() of half of it, and of it
     Pose X_WE;
-    std::vector<Pose> X_WB;                                                // where each step begins
-    std::vector<Contacts> contacts;                                        // in its middle
-    Eigen::Array2d low = Eigen::Array2d::Constant(INFINITY), high = -low;  // of all of these
+    std::vector<Pose> X_WB;          // where each step begins
+    std::vector<Contacts> contacts;  // in its middle
+    // Of all of these.
+    Eigen::Array2d low = Eigen::Array2d::Constant(INFINITY), high = -low;
   };
   using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
   Contacts contacts_at(const Pose& X_WB) const;
