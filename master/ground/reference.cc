@@ -232,7 +232,8 @@ const GroundHypothesis* fault_of(const GroundRobot& robot, const RunLog& log,
   return fault ? &question.catalogue[fault->hypothesis] : nullptr;
 }
 
-GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed) {
+GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
+                             bool alone) {
   GroundReference reference;
   for (const FitRow& row : fit.rows) {
     reference.names.push_back(row.row.name);
@@ -240,7 +241,7 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
   }
   reference.values = fit.values;
   reference.windows = fitter.ended_windows(fit);
-  reference.draws = fitter.draws(fit, seed, /*all=*/true).colwise() - fit.values;
+  reference.draws = fitter.draws(fit, seed, /*all=*/alone).colwise() - fit.values;
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     if (fit.rows[k].row.name != "grip") continue;
     const double unsure = unsure_grip(fitter, fit, k);
@@ -301,7 +302,7 @@ Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
 
 Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& reference,
                                         const WindowSettings& settings, std::uint64_t seed,
-                                        FitMemo* memo) {
+                                        FitMemo* memo, bool alone) {
   GroundQuestion question;
   question.rows = change_rows(robot);
   add_gyro_scale(reference, &question.rows);
@@ -317,7 +318,7 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
     return Error{"the log that values are fitted to is wrong in " + h->thing + ". " + h->remedy};
   }
   fit = with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), std::move(fit));
-  question.reference = reference_of(fitter, fit, seed);
+  question.reference = reference_of(fitter, fit, seed, alone);
   for (std::size_t k = 0; k < question.rows.size(); ++k) {
     question.rows[k].nominal = fit.values[k];
   }

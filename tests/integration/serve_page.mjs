@@ -4,7 +4,7 @@
 // compared, addresses opened again, a drive, windows of a ground robot's runs and pushes played, keys only,
 // a phone, dark, without events, without scripts, and a server that goes away.
 import { spawn } from "node:child_process";
-import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { check, end, failures, open } from "./browser.mjs";
 
@@ -150,10 +150,13 @@ async function diagnosed(view) {
   const made = start("simulate", "d.toml", "--trials", "120", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
   check((await made.ended) === 0, `nothing to diagnose: ${made.said}`);
   const diagnosis = start("diagnose", "d.toml", "--trials", "d.csv", "--out", "d", "--workers", "1");
-  // Held up again and again, so that its stages are there to be seen however fast the machine is.
-  const hold = () => { diagnosis.kill("SIGSTOP"); setTimeout(() => diagnosis.kill("SIGCONT"), 1400); };
-  const holding = setInterval(hold, 1600);
+  // Held up until the page is open and again and again from then on, so that its stages are there to
+  // be seen however fast the machine is.
+  while (!existsSync(join(folder, "d", "simulations.sqlite"))) await new Promise((go) => setTimeout(go, 10));
+  diagnosis.kill("SIGSTOP");
   const page = await open(await served(view("d")), { may });
+  const hold = () => { diagnosis.kill("SIGCONT"); setTimeout(() => diagnosis.kill("SIGSTOP"), 500); };
+  const holding = setInterval(hold, 1500);
   const stage = `document.querySelector("#tiles")?.innerText || ""`;
   await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work", 200_000);
   // What was found is there before the report is, stage by stage.
@@ -161,6 +164,7 @@ async function diagnosed(view) {
   await until(page, told("the base model"), "what the first stage found is told", 200_000);
   await until(page, told("what the catalogue offers"), "what the catalogue offers is told", 200_000);
   clearInterval(holding);
+  setTimeout(() => diagnosis.kill("SIGCONT"), 600);
   await page.picture("serve-diagnosis-live");
   await until(page, `document.getElementById("shrinkage") || document.getElementById("screening")`, "the diagnosis becomes its report", 400_000);
   check((await diagnosis.ended) === 0, `the diagnosis did not end well: ${diagnosis.said}`);

@@ -55,7 +55,7 @@ Result<GroundReference> fit_source(const GroundSource& source, Console& console)
   const bool together = log.relative && shares_a_clock(log);
   const WindowSettings each_row = {{kEachRow_s}, 0.5}, summed = {{0.5, 2, 5}, 0.5};
   const auto ask = [&](const WindowSettings& windows) {
-    return ask_what_changed(robot, log, windows, 1, nullptr);
+    return ask_what_changed(robot, log, windows, 1, nullptr, /*alone=*/true);
   };
   ASSIGN_OR_RETURN(auto asked, ask(together ? each_row : summed));
   if (together && clocks_are_apart(robot, *asked.reference)) {
