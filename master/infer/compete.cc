@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <nlopt.hpp>
 #include <utility>
 
 #include "common/base/try.h"
+#include "master/infer/climb.h"
 #include "master/infer/scope.h"
 
 namespace gapfarm::infer {
@@ -171,31 +170,6 @@ Status Search::run(int steps, std::vector<Runner>* runners) const {
   return {};
 }
 
-using Objective = std::function<double(const std::vector<double>&)>;
-
-// The highest point that so many evaluations find within those bounds.
-std::vector<double> climbed(const Objective& objective, int evaluations, std::vector<double> from,
-                            const std::vector<double>& lower, const std::vector<double>& upper) {
-  nlopt::opt search(nlopt::LN_SBPLX, static_cast<unsigned>(from.size()));
-  search.set_max_objective(
-      [](unsigned n, const double* at, double*, void* self) {
-        return (*static_cast<const Objective*>(self))(std::vector<double>(at, at + n));
-      },
-      const_cast<Objective*>(&objective));
-  search.set_lower_bounds(lower);
-  search.set_upper_bounds(upper);
-  search.set_initial_step(kBlindStep);
-  search.set_ftol_abs(kSettledGain / 5);
-  search.set_maxeval(evaluations);
-  double value = 0;
-  try {
-    search.optimize(from, value);
-  } catch (const std::exception&) {
-    // Roundoff, where nothing is left to gain; `from` holds the best point so far.
-  }
-  return from;
-}
-
 Status Search::search_blindly(Runner* runner) const {
   const Hypothesis& h = hypotheses_[runner->hypothesis];
   const Fitter fits = fitter(runner->space);
@@ -217,10 +191,15 @@ Status Search::search_blindly(Runner* runner) const {
     return std::vector<double>(bounds.begin(), bounds.end());
   };
   const Eigen::VectorXd far = Eigen::VectorXd::Constant(own.size(), kLongestStep);
-  const std::vector<double> best =
-      climbed(score, kBlindSearch * static_cast<int>(own.size()), listed(own),
-              listed(runner->space.lower().tail(own.size()).cwiseMax(own - far)),
-              listed(runner->space.upper().tail(own.size()).cwiseMin(own + far)));
+  std::vector<double> best = listed(own);
+  climb(score,
+        {.subplex = true,
+         .lower = listed(runner->space.lower().tail(own.size()).cwiseMax(own - far)),
+         .upper = listed(runner->space.upper().tail(own.size()).cwiseMin(own + far)),
+         .step = std::vector<double>(best.size(), kBlindStep),
+         .tolerance = kSettledGain / 5,
+         .evaluations = kBlindSearch * static_cast<int>(own.size())},
+        &best);
   if (!predicted) return predicted;
   auto fit = fits.start(joined(base, Eigen::VectorXd::Map(best.data(), own.size())));
   if (!fit) return fit.error();

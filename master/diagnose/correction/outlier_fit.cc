@@ -3,10 +3,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <nlopt.hpp>
 #include <numbers>
 
 #include "common/score/density.h"
+#include "master/infer/climb.h"
 
 namespace gapfarm {
 namespace {
@@ -142,23 +142,15 @@ struct Likelihood {
 
 // The nearest hill's top.
 double climb(const Likelihood& likelihood, int most, Search* from) {
-  nlopt::opt search(nlopt::LN_SBPLX, static_cast<unsigned>(from->x.size()));
-  search.set_max_objective([](unsigned, const double* at, double*,
-                              void* self) { return static_cast<const Likelihood*>(self)->at(at); },
-                           const_cast<Likelihood*>(&likelihood));
-  search.set_lower_bounds(from->lower);
-  search.set_upper_bounds(from->upper);
-  search.set_initial_step(from->step);
-  search.set_xtol_abs(0.003);
-  search.set_ftol_abs(0.05);
-  search.set_maxeval(most);
-  double value = 0;
-  try {
-    search.optimize(from->x, value);
-  } catch (const std::exception&) {
-    // Roundoff stops the search where nothing is left to gain; x holds the best point so far.
-  }
-  return likelihood.at(from->x.data());
+  return infer::climb([&](const std::vector<double>& x) { return likelihood.at(x.data()); },
+                      {.subplex = true,
+                       .lower = from->lower,
+                       .upper = from->upper,
+                       .step = from->step,
+                       .x_tolerance = 0.003,
+                       .tolerance = 0.05,
+                       .evaluations = most},
+                      &from->x);
 }
 
 OutlierFit climbed(const Likelihood& likelihood, int most, const OutlierFit& from) {

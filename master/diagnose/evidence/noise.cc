@@ -3,12 +3,12 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <nlopt.hpp>
 #include <numeric>
 
 #include "common/math/statistics.h"
 #include "common/score/scale_mixture.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/climb.h"
 
 namespace gapfarm {
 namespace {
@@ -69,25 +69,18 @@ NoiseFit climb(const TailLikelihood& likelihood, const NoiseEstimate& from, bool
     step.insert(step.end(), {0.15, 0.15});
   }
   // A simplex that has shrunk begins once more.
+  const auto nats = [&](const std::vector<double>& at) {
+    return likelihood.nats(TailLikelihood::at(at.data(), static_cast<unsigned>(at.size())));
+  };
   for (int round = 0; round < 2; ++round) {
-    nlopt::opt search(nlopt::LN_NELDERMEAD, static_cast<unsigned>(x.size()));
-    search.set_max_objective(
-        [](unsigned n, const double* at, double*, void* self) {
-          return static_cast<const TailLikelihood*>(self)->nats(TailLikelihood::at(at, n));
-        },
-        const_cast<TailLikelihood*>(&likelihood));
-    search.set_lower_bounds(lower);
-    search.set_upper_bounds(upper);
-    search.set_initial_step(step);
-    search.set_xtol_abs(0.01);
-    search.set_ftol_abs(0.05);
-    search.set_maxeval(tails ? 250 : 150);
-    double value = 0;
-    try {
-      search.optimize(x, value);
-    } catch (const std::exception&) {
-      // Roundoff stops the search where nothing is left to gain; x holds the best point so far.
-    }
+    infer::climb(nats,
+                 {.lower = lower,
+                  .upper = upper,
+                  .step = step,
+                  .x_tolerance = 0.01,
+                  .tolerance = 0.05,
+                  .evaluations = tails ? 250 : 150},
+                 &x);
   }
   NoiseFit fit{TailLikelihood::at(x.data(), static_cast<unsigned>(x.size())), 0};
   fit.nats = likelihood.nats(fit.noise);
@@ -113,7 +106,7 @@ struct Likelihood {
     return noise;
   }
 
-  double negative(const NoiseEstimate& noise) const {
+  double nats(const NoiseEstimate& noise) const {
     double sum = 0;
     for (std::size_t i = 0; i < trials.size(); ++i) {
       const Eigen::Matrix3d cov = covariance(trials[i], noise);
@@ -122,7 +115,7 @@ struct Likelihood {
           d2 > kTailFromSquared
               ? kTailFromSquared + tail * std::log1p((d2 - kTailFromSquared) / tail)
               : d2;
-      sum += 0.5 * (std::log(cov.determinant()) + bounded);
+      sum -= 0.5 * (std::log(cov.determinant()) + bounded);
     }
     return sum;
   }
@@ -253,24 +246,13 @@ NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
     x.push_back(first(start.pose.position_m, 0.0015));
     x.push_back(first(start.pose.heading_rad, 0.008));
   }
-  nlopt::opt search(nlopt::LN_NELDERMEAD, static_cast<unsigned>(x.size()));
-  search.set_min_objective(
-      [](unsigned n, const double* at, double*, void* self) {
-        const auto* l = static_cast<const Likelihood*>(self);
-        return l->negative(l->at(std::vector<double>(at, at + n)));
-      },
-      const_cast<Likelihood*>(&likelihood));
-  search.set_lower_bounds(std::vector<double>(x.size(), std::log(kLeastDeviation)));
-  search.set_upper_bounds(std::vector<double>(x.size(), std::log(kMost)));
-  search.set_initial_step(0.3);
-  search.set_xtol_abs(0.005);
-  search.set_maxeval(300);
-  double value = 0;
-  try {
-    search.optimize(x, value);
-  } catch (const std::exception&) {
-    // Roundoff stops the search where nothing is left to gain; x holds the best point so far.
-  }
+  infer::climb([&](const std::vector<double>& at) { return likelihood.nats(likelihood.at(at)); },
+               {.lower = std::vector<double>(x.size(), std::log(kLeastDeviation)),
+                .upper = std::vector<double>(x.size(), std::log(kMost)),
+                .step = std::vector<double>(x.size(), 0.3),
+                .x_tolerance = 0.005,
+                .evaluations = 300},
+               &x);
   return likelihood.at(x);
 }
 

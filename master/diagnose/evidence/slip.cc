@@ -7,12 +7,12 @@
 #include <cstdio>
 #include <functional>
 #include <map>
-#include <nlopt.hpp>
 #include <utility>
 
 #include "common/base/text.h"
 #include "common/pose/segment.h"
 #include "common/score/density.h"
+#include "master/infer/climb.h"
 
 namespace gapfarm {
 namespace {
@@ -88,24 +88,12 @@ class Mixture {
 
 double maximise(const std::function<double(const std::vector<double>&)>& f, int most,
                 std::vector<double>* x) {
-  nlopt::opt search(nlopt::LN_NELDERMEAD, static_cast<unsigned>(x->size()));
-  auto function = f;
-  search.set_max_objective(
-      [](unsigned n, const double* at, double*, void* self) {
-        return (*static_cast<decltype(function)*>(self))(std::vector<double>(at, at + n));
-      },
-      &function);
-  search.set_initial_step(0.2);
-  search.set_xtol_abs(0.02);
-  search.set_ftol_abs(0.1);
-  search.set_maxeval(most);
-  double value = f(*x);
-  try {
-    search.optimize(*x, value);
-  } catch (const std::exception&) {
-    value = f(*x);  // roundoff where nothing is left to gain
-  }
-  return value;
+  return infer::climb(f,
+                      {.step = std::vector<double>(x->size(), 0.2),
+                       .x_tolerance = 0.02,
+                       .tolerance = 0.1,
+                       .evaluations = most},
+                      x);
 }
 
 constexpr double kPlaceStep_m = 0.1;

@@ -162,12 +162,10 @@ std::vector<infer::Hypothesis> Competition::of_rows(const std::set<std::string>&
 // Observations that a disc there can change.
 std::vector<std::uint32_t> Competition::touched_by(const std::string& effect,
                                                    const Overrides& at) const {
-  Patch disc;
-  for (std::size_t k = 0; k < disc.size(); ++k) {
-    constexpr const char* kKeys[] = {".x", ".y", ".radius", ".ratio"};
-    disc[k] = at.at(of_.table().row(effect + kKeys[k]));
-  }
-  const std::vector<bool> touched = study_.subject->touched_by(of_.problem, study_, disc);
+  Signature disc;
+  disc.effect = effect;
+  for (const auto& [row, value] : at) disc.fixed[of_.table()[row].key] = value;
+  const std::vector<bool> touched = study_.subject->touched_by(of_.problem, study_, patch_of(disc));
   std::vector<std::uint32_t> trials;
   for (std::uint32_t i = 0; i < touched.size(); ++i) {
     if (touched[i]) trials.push_back(i);
