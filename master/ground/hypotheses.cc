@@ -360,6 +360,12 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
   return std::move(catalogue.all);
 }
 
+void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows) {
+  const bool any =
+      std::ranges::any_of(log.runs, [](const LoggedRun& run) { return !run.yaw_rates.empty(); });
+  if (any) rows->push_back({kGyroScale, 1, kGyroShare, "ratio", "-"});
+}
+
 std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all) {
   if (log.relative) std::erase_if(all, [](const GroundHypothesis& h) { return h.of_world; });
   for (GroundHypothesis& h : all) {
@@ -372,14 +378,11 @@ std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<Groun
     h.remedy += " If it is " + other + ", turn the signs of y and theta instead.";
     h.aliases.emplace_back(log.relative ? "sensor_upside_down" : "axes_mirrored");
   }
-  const bool has_gyro =
-      std::ranges::any_of(log.runs, [](const LoggedRun& run) { return !run.yaw_rates.empty(); });
-  if (has_gyro) {
-    GroundHypothesis& gyro = all.emplace_back();
-    gyro.name = kGyroScale;
-    gyro.thing = "the scale of the gyro";
-    gyro.freed = {{kGyroScale, 1, kGyroShare, "ratio", "-"}};
-  }
+  GroundHypothesis gyro;
+  gyro.name = kGyroScale;
+  gyro.thing = "the scale of the gyro";
+  add_gyro_scale(log, &gyro.freed);
+  if (!gyro.freed.empty()) all.push_back(std::move(gyro));
   return all;
 }
 

@@ -45,6 +45,9 @@ double plausible_error(const KinematicRow& row);
 // Rows that every fit moves a little, within their tolerances.
 std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot);
 
+// A row for the gyro's scale, where the log has one.
+void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows);
+
 // In the order in which equals are preferred: simple first.
 std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot);
 

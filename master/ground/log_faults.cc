@@ -156,7 +156,7 @@ std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit) {
     const Eigen::Vector3d& scale = fit.scales[static_cast<std::size_t>(windows.horizon[i])];
     misses[run[i]].push_back(fit.residuals[i].cwiseQuotient(scale).norm());
   }
-  std::vector<FarRun> odd;
+  std::vector<FarRun> far;
   for (std::size_t r = 0; r < misses.size(); ++r) {
     std::vector<double> others;
     for (std::size_t other = 0; other < misses.size(); ++other) {
@@ -164,9 +164,9 @@ std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit) {
     }
     if (misses[r].empty() || others.size() < 2) continue;
     const double times = median(misses[r]) / std::max(median(others), 1e-12);
-    if (times > kOddRun) odd.push_back({r, times});
+    if (times > kFarRun) far.push_back({r, times});
   }
-  return odd;
+  return far;
 }
 
 std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,

@@ -361,10 +361,4 @@ Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
   return settled;
 }
 
-void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows) {
-  const bool any = std::any_of(log.runs.begin(), log.runs.end(),
-                               [](const LoggedRun& run) { return !run.yaw_rates.empty(); });
-  if (any) rows->push_back({kGyroScale, 1, kGyroShare, "ratio", "-"});
-}
-
 }  // namespace gapfarm

@@ -31,9 +31,6 @@ Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
                                     const WindowSettings& settings, const GroundQuestion& question,
                                     std::uint64_t seed);
 
-// A row for the gyro's scale, where the log has one.
-void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows);
-
 // The values of change_rows() and of command_offsets() by one log alone; their covariance is by its
 // own scatter.  Errors: as ask_what_changed(); too few windows.
 Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,

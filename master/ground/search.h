@@ -141,17 +141,17 @@ Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,
                                Eigen::VectorXd* values);
 
-// Whether the runs of a log share a clock: each log may have its own offset between what commands
-// and what measures.
-
 struct FarRun {
   std::size_t run = 0;  // in the log
   double times = 1;     // what the other runs miss by
 };
 
-// Of three runs or more those whose windows miss by far more than the others' (kOddRun), medians
+// Of three runs or more those whose windows miss by far more than the others' (kFarRun), medians
 // of each: commands of another run, a world that is mirrored in this one alone.
 std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit);
+
+// Whether the runs of a log share a clock: each log may have its own offset between what commands
+// and what measures.
 
 struct RunClock {
   std::size_t run = 0;  // in the log

@@ -124,7 +124,7 @@ inline constexpr double kShareOfFirst = 0.5;
 inline constexpr double kUnshown = 0.7;
 // A run is off by itself where its windows miss by this many times what the other runs' do, in the
 // median: real runs of the cases reach 4.2, one that is mirrored alone 50 and more.
-inline constexpr double kOddRun = 10;
+inline constexpr double kFarRun = 10;
 // Of the frames on the way, for stale frames to be named: the Warthog's laser poses repeat 2 %.
 inline constexpr double kLeastStaleShare = 0.03;
 // Rounding is named where it is this share of the scatter of the shortest windows or more: a tenth

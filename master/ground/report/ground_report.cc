@@ -206,7 +206,7 @@ void GroundReport::judge() {
   figures_.faults += static_cast<int>(search_.faults.size());
   figures_.closable = search_.closable;
   figures_.best_of_all = search_.best_of_all;
-  figures_.odd_runs = text_of_odd_runs(search_, far_runs(fitter_, search_.fit));
+  figures_.far_runs = text_of_far_runs(search_, far_runs(fitter_, search_.fit));
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
   unseen_ = values_not_shown(fitter_, search_, options_.seed);

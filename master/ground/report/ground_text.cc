@@ -229,12 +229,12 @@ bool may_be_named(const HeldOutGain& gain) { return std::isfinite(gain.lo) && ga
 
 bool nothing_is_left(const GroundFigures& figures) {
   const HeldOutGain& left = figures.closable;
-  return figures.odd_runs.empty() && std::isfinite(left.mean) && std::isfinite(left.hi) &&
+  return figures.far_runs.empty() && std::isfinite(left.mean) && std::isfinite(left.hi) &&
          std::max(left.mean, left.hi) <= kToleratedGap;
 }
 
 bool something_is_left(const GroundFigures& figures) {
-  return !figures.odd_runs.empty() ||
+  return !figures.far_runs.empty() ||
          (figures.closable.lo > 0 && figures.closable.mean > kToleratedGap);
 }
 
@@ -255,8 +255,8 @@ std::string verdict_reason(const GroundFigures& figures) {
         "{:.2g}, residuals 10 % smaller.",
         closes, kToleratedGap);
   }
-  if (!figures.odd_runs.empty()) {
-    return figures.odd_runs +
+  if (!figures.far_runs.empty()) {
+    return figures.far_runs +
            " Look at the commands and the poses of these: another run's, the other way round, or "
            "something that happened there alone.";
   }
@@ -314,8 +314,8 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
   return found;
 }
 
-std::string text_of_odd_runs(const GroundSearch& search, const std::vector<FarRun>& odd) {
-  return joined(odd, " ", [&](const FarRun& o) {
+std::string text_of_far_runs(const GroundSearch& search, const std::vector<FarRun>& far) {
+  return joined(far, " ", [&](const FarRun& o) {
     return fmt::format("Run {} misses by {:.0f} times as much as the others.",
                        search.log.runs[o.run].run, o.times);
   });

@@ -43,7 +43,7 @@ struct GroundFigures {
   // of the catalogue, every value free) would still gain, held out.
   HeldOutGain closable;
   std::string best_of_all = {};  // what that was: "floor_edge"
-  std::string odd_runs = {};     // which runs are off by themselves; empty: none
+  std::string far_runs = {};     // which runs are off by themselves; empty: none
 };
 
 // Whether a value may be named: its gain's interval lies above 0.
@@ -71,7 +71,7 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
                               const std::vector<double>& horizons_s);
 
 // "Run 3 misses by 12 times as much as the others.", one sentence a run; empty: none.
-std::string text_of_odd_runs(const GroundSearch& search, const std::vector<FarRun>& odd);
+std::string text_of_far_runs(const GroundSearch& search, const std::vector<FarRun>& far);
 
 // "These runs do not show whether these are right: the distance between the sides.", of values that
 // the log leaves as unsure as they were before it; empty: there are none.

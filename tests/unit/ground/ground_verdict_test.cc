@@ -51,7 +51,7 @@ TEST(GroundVerdict, AGainWhoseIntervalHoldsZeroIsNoName) {
 TEST(GroundVerdict, AnOddRunIsNotNothing) {
   GroundFigures figures = left(0, 0, 0);
   EXPECT_EQ(ground_verdict(figures), Verdict::kNone);
-  figures.odd_runs = "Run 3 misses by 71 times as much as the others.";
+  figures.far_runs = "Run 3 misses by 71 times as much as the others.";
   EXPECT_EQ(ground_verdict(figures), Verdict::kUnknown);
   EXPECT_NE(verdict_reason(figures).find("Run 3 misses by 71"), std::string::npos);
 }
