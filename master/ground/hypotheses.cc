@@ -361,9 +361,9 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
 }
 
 void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows) {
-  const bool any =
-      std::ranges::any_of(log.runs, [](const LoggedRun& run) { return !run.yaw_rates.empty(); });
-  if (any) rows->push_back({kGyroScale, 1, kGyroShare, "ratio", "-"});
+  const auto has_none = [](const LoggedRun& run) { return run.yaw_rates.empty(); };
+  if (!std::ranges::all_of(log.runs, has_none))
+    rows->push_back({kGyroScale, 1, kGyroShare, "ratio", "-"});
 }
 
 std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all) {
@@ -378,9 +378,7 @@ std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<Groun
     h.remedy += " If it is " + other + ", turn the signs of y and theta instead.";
     h.aliases.emplace_back(log.relative ? "sensor_upside_down" : "axes_mirrored");
   }
-  GroundHypothesis gyro;
-  gyro.name = kGyroScale;
-  gyro.thing = "the scale of the gyro";
+  GroundHypothesis gyro{kGyroScale, {}, "the scale of the gyro", {}, {}, 1, "", false};
   add_gyro_scale(log, &gyro.freed);
   if (!gyro.freed.empty()) all.push_back(std::move(gyro));
   return all;
