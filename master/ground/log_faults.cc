@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -33,6 +34,17 @@ std::vector<std::size_t> runs_of(const WindowSet& windows) {
     runs.push_back(static_cast<std::size_t>(after - windows.run_blocks.begin()) - 1);
   }
   return runs;
+}
+
+bool all_alike(const std::vector<CommandedRun>& runs) {
+  const std::vector<double>* first = nullptr;
+  for (const CommandedRun& run : runs) {
+    for (const CommandRow& row : run.commands) {
+      if (first != nullptr && row.values != *first) return false;
+      first = &row.values;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -167,6 +179,37 @@ std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit) {
     if (times > kFarRun) far.push_back({r, times});
   }
   return far;
+}
+
+double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {
+  const WindowSet& windows = fitter.windows();
+  if (all_alike(windows.runs)) return 0;
+  const std::vector<Eigen::Vector3d> missed = fitter.raw_residuals(fit);
+  double least = INFINITY;
+  for (int length = 0; length < windows.lengths; ++length) {
+    std::array<std::vector<double>, 3> moved;
+    Eigen::Vector3d missing = Eigen::Vector3d::Zero(), sizes = missing;
+    for (std::size_t i = 0; i < missed.size(); ++i) {
+      if (windows.horizon[i] != length) continue;
+      const Pose X = between(windows.trials[i].X_WS, windows.trials[i].X_WE);
+      missing += missed[i].cwiseAbs();
+      sizes += Eigen::Vector3d(X.x, X.y, X.theta).cwiseAbs();
+      for (int c = 0; c < 3; ++c) moved[c].push_back(c == 0 ? X.x : c == 1 ? X.y : X.theta);
+    }
+    const auto count = static_cast<double>(moved[0].size());
+    // Straight drives at one speed differ by noise alone.
+    const double way = sizes.head<2>().norm(), turns = std::max(sizes[2], count);
+    // A throttle's windows begin at the speed that was measured, which says how far they go.
+    for (int c = is_throttled(fitter.robot()) ? 1 : 0; c < 3 && count > 0; ++c) {
+      const double middle = median(moved[c]);
+      double scatter = 0;
+      for (const double m : moved[c]) scatter += std::abs(m - middle);
+      if (scatter > kEvenMotion * (c < 2 ? way : turns)) {
+        least = std::min(least, missing[c] / scatter);
+      }
+    }
+  }
+  return std::isfinite(least) ? least : 0;
 }
 
 std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,

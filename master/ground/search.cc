@@ -375,6 +375,13 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   emit_steps(work, search);
   stage(kRestStage);
   measure_rest(fitter, work, &search);
+  search.unexplained = share_unexplained(fitter, search.best);
+  if (search.unexplained >= kUnexplained && !(search.faults.empty() && search.steps.empty())) {
+    // What fits a little better then is a name for nothing.
+    GroundQuestion as_it_is = question;
+    as_it_is.catalogue.clear();
+    return search_ground(robot, log, settings, as_it_is, work);
+  }
   if (work.stopped && work.stopped()) return stopped;
   emit_rest(work, search);
   return search;

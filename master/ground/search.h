@@ -103,6 +103,7 @@ struct GroundSearch {
   WindowFit best;
   std::string best_of_all;  // "floor_edge"
   HeldOutGain closable;
+  double unexplained = 0;  // share_unexplained() by the best
 };
 
 // A fault of the log that, put right, explains it far better than the file does as it is; nothing
@@ -123,6 +124,7 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
 Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
                      const GroundQuestion& question, FitMemo* memo, GroundSearch* search);
 
+// Where not even the best explains motions by commands, nothing is named and no fault put right.
 // Errors: no window fits, stopped.
 Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
                                    const WindowSettings& settings, const GroundQuestion& question,
@@ -149,6 +151,11 @@ struct FarRun {
 // Of three runs or more those whose windows miss by far more than the others' (kFarRun), medians
 // of each: commands of another run, a world that is mirrored in this one alone.
 std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit);
+
+// How much of what motions differ by a fit leaves, mean absolute values, of the component of the
+// ends that it explains best: near 1 where commands have nothing to do with how the robot moved.
+// 0: all commands or all motions are alike, so that nobody knows.
+double share_unexplained(const WindowFitter& fitter, const WindowFit& fit);
 
 // Whether the runs of a log share a clock: each log may have its own offset between what commands
 // and what measures.

@@ -125,6 +125,11 @@ inline constexpr double kUnshown = 0.7;
 // A run is off by itself where its windows miss by this many times what the other runs' do, in the
 // median: real runs of the cases reach 4.2, one that is mirrored alone 50 and more.
 inline constexpr double kFarRun = 10;
+// Commands do not explain motions of which the best fit leaves this share: real runs of the cases
+// come to 0.24 at most, with the commands of other runs to 0.69 and more.
+inline constexpr double kUnexplained = 0.5;
+// Motions are all alike where their mean deviation is less than this share of the way, and rad.
+inline constexpr double kEvenMotion = 0.1;
 // Of the frames on the way, for stale frames to be named: the Warthog's laser poses repeat 2 %.
 inline constexpr double kLeastStaleShare = 0.03;
 // Rounding is named where it is this share of the scatter of the shortest windows or more: a tenth

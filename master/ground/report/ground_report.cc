@@ -207,6 +207,7 @@ void GroundReport::judge() {
   figures_.closable = search_.closable;
   figures_.best_of_all = search_.best_of_all;
   figures_.far_runs = text_of_far_runs(search_, far_runs(fitter_, search_.fit));
+  figures_.unexplained = search_.unexplained;
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
   unseen_ = values_not_shown(fitter_, search_, options_.seed);

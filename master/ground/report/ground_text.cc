@@ -229,12 +229,13 @@ bool may_be_named(const HeldOutGain& gain) { return std::isfinite(gain.lo) && ga
 
 bool nothing_is_left(const GroundFigures& figures) {
   const HeldOutGain& left = figures.closable;
-  return figures.far_runs.empty() && std::isfinite(left.mean) && std::isfinite(left.hi) &&
+  return figures.unexplained < kUnexplained && figures.far_runs.empty() &&
+         std::isfinite(left.mean) && std::isfinite(left.hi) &&
          std::max(left.mean, left.hi) <= kToleratedGap;
 }
 
 bool something_is_left(const GroundFigures& figures) {
-  return !figures.far_runs.empty() ||
+  return figures.unexplained >= kUnexplained || !figures.far_runs.empty() ||
          (figures.closable.lo > 0 && figures.closable.mean > kToleratedGap);
 }
 
@@ -254,6 +255,15 @@ std::string verdict_reason(const GroundFigures& figures) {
         "All that was tried would close another {} on stretches that were not fitted: within "
         "{:.2g}, residuals 10 % smaller.",
         closes, kToleratedGap);
+  }
+  if (figures.unexplained >= kUnexplained) {
+    return fmt::format(
+        "What is commanded does not explain how the robot moved: the best of what was tried leaves "
+        "{:.0f} % of "
+        "what its motions differ by. Are these the commands and the poses of the same runs, and do "
+        "both "
+        "columns mean what the robot's file says?",
+        100 * figures.unexplained);
   }
   if (!figures.far_runs.empty()) {
     return figures.far_runs +

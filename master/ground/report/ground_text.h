@@ -44,15 +44,18 @@ struct GroundFigures {
   HeldOutGain closable;
   std::string best_of_all = {};  // what that was: "floor_edge"
   std::string far_runs = {};     // which runs are off by themselves; empty: none
+  double unexplained = 0;        // share_unexplained() by that best; from kUnexplained on nothing
+                                 // is named that commands would have to show
 };
 
 // Whether a value may be named: its gain's interval lies above 0.
 bool may_be_named(const HeldOutGain& gain);
 
 // Whether it is significant and, as far as anybody can say, more than kToleratedGap, or a run is
-// odd.
+// odd, or commands explain nothing.
 bool something_is_left(const GroundFigures& figures);
-// Whether what is left lies within kToleratedGap, all of its interval, and no run is odd.
+// Whether what is left lies within kToleratedGap, all of its interval, no run is odd, and commands
+// explain motions.
 bool nothing_is_left(const GroundFigures& figures);
 
 // REQUIRES: every gain of `named` may be named.

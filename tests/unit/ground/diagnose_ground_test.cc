@@ -187,6 +187,19 @@ TEST(DiagnoseGround, ARunThatIsTheOtherWayRoundAloneIsNamed) {
   }
 }
 
+TEST(DiagnoseGround, CommandsOfOtherRunsExplainNothing) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog log = driven(robot, {});
+  Stream stream({5, Purpose::kTest, 0, 0, 0});
+  for (LoggedRun& run : log.runs) {
+    for (CommandRow& row : run.commands) row.values = {9 * stream.uniform(), 9 * stream.uniform()};
+  }
+  const Diagnosis found = diagnosis_of(robot, log).diagnosis;
+  EXPECT_EQ(found.verdict, Verdict::kUnknown) << found.headline;
+  EXPECT_TRUE(found.effects.empty()) << found.headline;
+  EXPECT_NE(found.headline.find("does not explain how the robot moved"), std::string::npos);
+}
+
 // Straight on nothing shows how far apart the sides are; a robot that stands shows nothing at all.
 TEST(DiagnoseGround, ReportsWhatTheLogCannotShow) {
   const GroundRobot robot = robot_of(kDifferential);

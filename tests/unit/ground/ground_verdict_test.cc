@@ -54,6 +54,9 @@ TEST(GroundVerdict, AnOddRunIsNotNothing) {
   figures.far_runs = "Run 3 misses by 71 times as much as the others.";
   EXPECT_EQ(ground_verdict(figures), Verdict::kUnknown);
   EXPECT_NE(verdict_reason(figures).find("Run 3 misses by 71"), std::string::npos);
+  figures = left(0, 0, 0);
+  figures.unexplained = 0.9;
+  EXPECT_EQ(ground_verdict(figures), Verdict::kUnknown);
 }
 
 TEST(GroundVerdict, WhatIsToleratedIsNotCalledWrong) {
