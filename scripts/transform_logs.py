@@ -50,6 +50,23 @@ def swapped_sides(rows, _):
     return rows
 
 
+def last_session(change):
+    def apply(rows, rng):
+        own = [row for row in rows if row["session"] == rows[-1]["session"]]
+        change(own, rng)
+        return rows
+    return apply
+
+
+def other_commands(rows, rng):
+    drawn = [dict(row) for row in rows]
+    rng.shuffle(drawn)
+    for row, other in zip(rows, drawn):
+        for c in ("command", "left", "right", "duration"):
+            row[c] = other[c]
+    return rows
+
+
 def thinned(count):
     def apply(rows, rng):
         kept = sorted(rng.sample(range(len(rows)), min(count, len(rows))))
@@ -110,6 +127,8 @@ HOW = {
     "compass headings": (poses(lambda x, y, a: (x, y, PI / 2 - a)), "heading_flipped"),
     "front for back": (poses(lambda x, y, a: (x, y, a + PI)), "heading_turned"),
     "sides swapped": (swapped_sides, "sides_swapped"),
+    "sides swapped in one session": (last_session(swapped_sides), "sides_swapped"),
+    "commands of other rows": (other_commands, "commands_unrelated"),
     "time backward": (backward, "refused"),
     "standing still": (still, "no_motion"),
 }

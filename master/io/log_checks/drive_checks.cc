@@ -44,6 +44,9 @@ constexpr double kPi = std::numbers::pi;
 constexpr std::size_t kFewestTurns = 8;
 constexpr double kGoodConcentration = 0.75;
 constexpr double kClearMargin = 0.4;
+// Half a log of noise leaves 0.5; by chance one in six logs of so few drives has as much as this.
+constexpr double kUnrelated = 0.3;
+constexpr std::size_t kManyStraight = 20;
 constexpr double kLeastShare = 0.3;  // of the typical distance: shorter ones have no direction
 // Catalogued as heading_offset up to here; beyond, an axis is another one.
 constexpr double kMostOffset_rad = 0.5;
@@ -234,6 +237,22 @@ bool check_heading_unit(const std::vector<DriveSample>& samples,
            "(concentration " +
            few_digits(scaled) + ", as logged " + few_digits(as_logged) + ").",
        "Multiply theta0 and theta1 by 180/pi: they were turned into radians twice."});
+  return true;
+}
+
+bool check_related(const std::vector<DriveSample>& samples, std::vector<SanityFinding>* findings) {
+  const TravelFit travel = fit_travel(samples);
+  if (travel.drives < kManyStraight || std::max(travel.same, travel.mirrored) > kUnrelated) {
+    return false;
+  }
+  findings->push_back({"commands_unrelated",
+                       "Over " + std::to_string(travel.drives) +
+                           " straight drives the direction of travel follows neither the heading "
+                           "(concentration " +
+                           share(travel.same) + ") nor its negative (" + share(travel.mirrored) +
+                           ").",
+                       "Look whether each row has the command that was driven between its poses, "
+                       "and the headings are the robot's."});
   return true;
 }
 

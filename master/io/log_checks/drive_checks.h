@@ -54,6 +54,8 @@ bool check_speed(const std::vector<DriveSample>& samples, const DriveLimits& lim
 // Headings of another unit: small ones while the travel goes all ways.
 bool check_heading_unit(const std::vector<DriveSample>& samples,
                         std::vector<SanityFinding>* findings);
+// Straight drives that go any way: commands of other trials, or poses of another robot.
+bool check_related(const std::vector<DriveSample>& samples, std::vector<SanityFinding>* findings);
 // Turns faster than the sides' speeds and their distance allow without any slip.
 void check_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                    std::vector<SanityFinding>* findings);

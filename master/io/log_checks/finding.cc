@@ -13,6 +13,7 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"heading_turned", "headings are counted from another axis"},
       {"sides_swapped", "left and right are exchanged"},
       {"direction_reversed", "the motors run backward"},
+      {"commands_unrelated", "commands and motions do not belong together"},
       {"unit_error", "it is in another unit"},
       {"robot_out_of_bounds", "this is no robot that the scenario can be"},
       {"base_not_simulated", "the base model cannot be simulated"},

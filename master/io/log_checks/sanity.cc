@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
+#include <utility>
 
 #include "common/base/ranges.h"
 #include "common/math/statistics.h"
@@ -99,6 +102,21 @@ void note_impossible(const Problem& problem, std::vector<SanityFinding>* finding
                        "Look at these rows; a diagnosis leaves them out.", Severity::kNote});
 }
 
+// One session may have been mounted or wired another way round.
+void check_axes_of_sessions(const Problem& problem, const std::vector<DriveSample>& samples,
+                            std::vector<SanityFinding>* findings) {
+  std::map<std::string, std::vector<DriveSample>> of_session;
+  for (const DriveSample& s : samples) {
+    of_session[problem.log.trials[s.trial].session].push_back(s);
+  }
+  for (const auto& [session, its] : of_session) {
+    auto axes = check_axes(its);
+    if (!axes) continue;
+    axes->text = "In session " + session + " alone: " + axes->text;
+    findings->push_back(std::move(*axes));
+  }
+}
+
 // Each only where the one before leaves it meaning: what does not move has no speed, and axes that
 // do not fit say nothing of turns.
 void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) {
@@ -111,6 +129,11 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
   } else if (auto axes = check_axes(samples)) {
     findings->push_back(std::move(*axes));
     suspicious = true;
+  } else if (check_related(samples, findings)) {
+    suspicious = true;
+  } else {
+    check_axes_of_sessions(problem, samples, findings);
+    suspicious |= !findings->empty();
   }
   if (suspicious) return;
   check_turning(samples, limits, findings);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <tuple>
+#include <utility>
 
 #include "common/random/stream.h"
 #include "master/io/log_checks/finding.h"
@@ -78,6 +80,28 @@ TEST(Sanity, IsTheSameWhereverTheLogLiesAndHoweverItIsTurned) {
                                })),
             "");
   EXPECT_EQ(first_name(spoiled(log, [](const Pose& X) { return Pose{0, 0, 2.1} * X; })), "");
+}
+
+TEST(Sanity, NamesTheSessionThatIsTheWrongWayRoundAlone) {
+  Problem problem = drawn_drives(150);
+  for (Trial& t : problem.log.trials) {
+    if (t.session == "s2") std::swap(t.left, t.right);
+  }
+  const auto findings = check_sanity(problem);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].name, "sides_swapped");
+  EXPECT_EQ(findings[0].text.find("In session s2 alone"), 0u) << findings[0].text;
+}
+
+TEST(Sanity, KnowsCommandsOfOtherTrials) {
+  Problem problem = drawn_drives(150);
+  const Problem other = drawn_drives(150, {}, 2);
+  for (std::size_t i = 0; i < 150; ++i) {
+    Trial& t = problem.log.trials[i];
+    const Trial& from = other.log.trials[i];
+    std::tie(t.command, t.left, t.right) = std::tie(from.command, from.left, from.right);
+  }
+  EXPECT_EQ(first_name(problem), "commands_unrelated");
 }
 
 TEST(Sanity, NamesWhatIsTheWrongWayRound) {
