@@ -1,0 +1,89 @@
+// Pushes of a piece that goes straight before the finger, logged with one thing wrong.
+#include "master/io/log_checks/push_checks.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <numbers>
+
+#include "common/parameters/push.h"
+#include "common/random/stream.h"
+
+namespace gapfarm::push_checks_test {
+
+constexpr double kPi = std::numbers::pi;
+
+// From its left side, by 5 cm; nothing of it is symmetric.
+Problem pushed() {
+  Problem problem;
+  problem.scenario = "push";
+  problem.values = problem.table().nominal();
+  const double finger_m = problem.values[row_of(Push::kFingerRadius)];
+  Piece piece;
+  piece.name = "wedge";
+  piece.corners = {{-0.03, -0.03}, {0.09, -0.03}, {-0.03, 0.05}};
+  problem.pieces = {piece};
+  Stream stream({.run_seed = 3});
+  for (int i = 0; i < 20; ++i) {
+    Trial t;
+    t.session = "s";
+    t.trial = i;
+    t.command = piece.name;
+    t.X_WS = {stream.uniform(-1, 1), stream.uniform(-1, 1), stream.uniform(-3, 3)};
+    t.X_WE = t.X_WS * Pose{0.05, 0, 0};
+    for (double way_m = -0.02; way_m <= 0.05; way_m += 0.01) {
+      const Eigen::Vector2d tip = transform(t.X_WS, {-0.03 - finger_m + way_m, 0});
+      t.tip.push_back({way_m + 0.02, tip.x(), tip.y()});
+    }
+    problem.log.trials.push_back(t);
+  }
+  return problem;
+}
+
+std::string named(const Problem& problem) {
+  std::vector<SanityFinding> findings;
+  check_pushes(problem, &findings);
+  return findings.empty() ? "" : findings.front().name;
+}
+
+TEST(PushChecks, NameHowPosesDoNotFitTheFingersWay) {
+  EXPECT_EQ(named(pushed()), "");
+  const struct {
+    const char* name;
+    std::function<Pose(const Pose&)> change;
+  } cases[] = {{"heading_flipped",
+                [](const Pose& X) {
+                  return Pose{X.x, X.y, -X.theta};
+                }},
+               {"heading_turned",
+                [](const Pose& X) {
+                  return Pose{X.x, X.y, X.theta + kPi / 2};
+                }},
+               {"axis_mirrored",
+                [](const Pose& X) {
+                  return Pose{X.x, -X.y, X.theta};
+                }},
+               {"axis_mirrored",
+                [](const Pose& X) {
+                  return Pose{X.x, -X.y, -X.theta};
+                }},
+               {"axes_swapped", [](const Pose& X) {
+                  return Pose{X.y, X.x, X.theta};
+                }}};
+  for (const auto& c : cases) {
+    Problem problem = pushed();
+    for (Trial& t : problem.log.trials) {
+      t.X_WS = c.change(t.X_WS);
+      t.X_WE = c.change(t.X_WE);
+    }
+    EXPECT_EQ(named(problem), c.name);
+  }
+}
+
+TEST(PushChecks, NoteAnotherPiece) {
+  Problem problem = pushed();
+  for (Eigen::Vector2d& corner : problem.pieces[0].corners) corner *= 1.5;
+  EXPECT_EQ(named(problem), "frames_apart");
+}
+
+}  // namespace gapfarm::push_checks_test
