@@ -1,9 +1,12 @@
 // The base, the noise and the evidence that later steps look at.
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/evidence/residuals.h"
@@ -17,6 +20,10 @@ constexpr int kLatencyRounds = 4;
 constexpr double kPathInterval_s = 0.005;
 constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
 constexpr double kLeastLagGain = 14;      // it stands for all samples of a path, which go together
+// For so long another robot may roll on by itself: what a late reading's age is counted from is its
+// recorder's secret.
+constexpr double kCoasting_s = 0.04;
+constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
 
 // Of every trial just before its motors stop, in the axes of its predicted end; none where that
 // cannot be simulated.
@@ -217,9 +224,14 @@ Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanati
   std::vector<Eigen::Vector3d> late;
   for (const ResidualTrial& t : right->study().trials) late.push_back(t.late);
   s.columns = right->study().whiten(late);
-  s.fixed = {{"pose_latency.share", right->latency.share},
-             {"pose_latency.latency", right->latency_from_rest_s}};
   right->first.push_back(std::move(s));
+  const LatencyFit& found = right->latency;
+  const double age = right->latency_from_rest_s, share = found.share;
+  right->spreads.push_back(
+      {"pose_latency",
+       {found.gain,
+        {{"latency", age, std::max(0.0, 0.8 * found.latency_s - kCoasting_s), 1.2 * age, "s"},
+         {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}}}});
   return right;
 }
 
@@ -233,6 +245,11 @@ Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial
   if (!lag) return lag.error();
   partial.lag = *lag;
   if (partial.lag.gain < kLeastLagGain) partial.lag.gain = 0;
+  if (partial.lag.gain == 0) return partial;
+  const double tau = partial.lag.tau_s;
+  const double half = kNormal90 * std::hypot(partial.lag.standard_error_s, kLagError * tau);
+  partial.spreads.push_back(
+      {"motor_lag", {partial.lag.gain, {{"tau", tau, tau - half, tau + half, "s"}}}});
   return partial;
 }
 
