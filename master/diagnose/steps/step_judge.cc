@@ -162,7 +162,7 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
     if (found.effect != "motor_lag") nats += found.fit.gain;
   }
   const PoseGrid& grid = named.study().grid;
-  const bool on_grid = (of.subject.looks & kLooksForRounding) != 0 && grid.step_m > kLeastQuantum_m;
+  const bool on_grid = of.knows(kRounding) && grid.step_m > kLeastQuantum_m;
   const bool names_grid = on_grid && !of.excluded(kRounding);
   if (names_grid) {
     named.spreads.push_back(

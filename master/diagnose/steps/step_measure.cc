@@ -185,10 +185,6 @@ bool DiagnosisRequest::excluded(const std::string& effect) const {
   return contains(options.excluded, effect) || !contains(known, effect, &Effect::name);
 }
 
-bool DiagnosisRequest::looks_for(const std::string& effect, Looks look) const {
-  return (subject.looks & look) != 0 && !excluded(effect);
-}
-
 bool DiagnosisRequest::has_paths() const {
   return !problem.external || (problem.external->table.declaration().inputs & kExternalPath) != 0;
 }
@@ -205,8 +201,7 @@ double DiagnosisRequest::frame_of(const std::string& key, const Overrides& at) c
 // A late camera reads a pose before the motion has ended; the next reading shows it.
 Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial) {
   const Study& study = partial.study();
-  if ((of.subject.looks & kLooksForLateReadings) == 0 || study.gaps.size() < kFewestGaps)
-    return partial;
+  if (!of.knows("pose_latency") || study.gaps.size() < kFewestGaps) return partial;
   ASSIGN_OR_RETURN(const auto velocity, end_velocities(of, study));
   if (velocity.empty()) return partial;
   partial.latency = fit_latency(study, velocity);
@@ -236,7 +231,7 @@ Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanati
 }
 
 Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial) {
-  if (!of.looks_for("motor_lag", kLooksForLag) || !of.has_paths()) return partial;
+  if (!of.knows("motor_lag") || of.excluded("motor_lag") || !of.has_paths()) return partial;
   auto lag = fit_path_lag(of.predictor, partial.study());
   if (!lag && lag.error().code == ErrorCode::kSimulation) {
     of.predictor.exclude("motor_lag");

@@ -123,7 +123,7 @@ Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation parti
 
 Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
                            const Proposals& catalogue, const Regression& explained) {
-  if ((of.subject.looks & kLooksForSlips) == 0) return partial;
+  if (!of.knows("slip_events")) return partial;
   const Study& study = partial.study();
   const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
   const std::vector<bool> informative = informative_about_slips(of, partial);

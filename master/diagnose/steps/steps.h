@@ -36,7 +36,8 @@ struct DiagnosisRequest {
   double outlier_share() const { return problem.fitness.outlier_share; }
   // As asked, or because the scenario's table has no such effect.
   bool excluded(const std::string& effect) const;
-  bool looks_for(const std::string& effect, Looks look) const;
+  // Whether it has a row among the scenario's.
+  bool knows(const std::string& effect) const { return subject.effects->find(effect) != nullptr; }
   // Whether poses on the way are known: some programs answer where a drive ends alone.
   bool has_paths() const;
   // Of a table key that is a place along a world axis: how far the log's frame lies along it.
