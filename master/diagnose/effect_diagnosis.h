@@ -153,6 +153,9 @@ struct EffectDiagnosis {
   EffectPhrases phrases = {};
   std::optional<ShortPhrases> short_phrases = {};
   const SpreadRow* spread = nullptr;  // of an effect that makes some trials outliers
+  // Of what no mean shows: how screening says that it was seen, or not.
+  const char* found = nullptr;
+  const char* missing = nullptr;
 };
 
 class EffectDiagnoses {

@@ -23,15 +23,6 @@
 
 namespace gapfarm {
 
-// Effects on the spread or the readings that are looked for beside the catalogue's means.
-enum Looks : unsigned {
-  kLooksAtNothingElse = 0,
-  kLooksForLateReadings = 1u << 0,
-  kLooksForLag = 1u << 1,  // in logged paths
-  kLooksForSlips = 1u << 2,
-  kLooksForRounding = 1u << 3,
-};
-
 // Where a value of NoiseEstimate stands in the parameter table, and its unit there.
 struct NoiseRow {
   std::size_t row = 0;
@@ -47,7 +38,6 @@ struct TrialView {
 struct DiagnosisSubject {
   const char* scenario = nullptr;
   const EffectDiagnoses* effects = nullptr;
-  unsigned looks = 0;
   // Net log-likelihood (nats over all trials) that an effect must gain to be named, and log10 of
   // the p below which a leftover dependence is no chance: measured on logs without any effect
   // (docs/diagnosis.md).

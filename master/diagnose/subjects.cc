@@ -63,7 +63,6 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
   DiagnosisSubject s;
   s.scenario = scenario;
   s.effects = &drive_effect_diagnoses();
-  s.looks = kLooksForLateReadings | kLooksForLag | kLooksForSlips | kLooksForRounding;
   // The best of the catalogue gained 4.4 at most in 90 of 100 null logs, 6.7 in 99, and the least
   // p of twelve blocks was 10^-3.8 (400 logs; docs/diagnosis.md).
   s.least_gain = 9;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -16,11 +17,6 @@ namespace gapfarm::steps {
 namespace {
 
 constexpr int kBootstraps = 400;
-
-// For so long another robot may roll on by itself: what a late reading's age is counted from is its
-// recorder's secret.
-constexpr double kCoasting_s = 0.04;
-constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
 
 std::vector<double> difference(std::vector<double> values, const std::vector<double>& less) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] -= less[i];
@@ -123,54 +119,6 @@ NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size
   return effect;
 }
 
-// An effect on the spread: gain in nats over all trials.
-struct SpreadEffect {
-  std::string name;
-  double gain = 0;
-  std::vector<Estimate> estimates;
-  std::vector<double> gained;  // of each trial, where that is known
-  std::vector<SessionGain> sessions = {};
-};
-
-// Effects that widen the distribution rather than move it: their gain is that of the mixture.
-std::vector<SpreadEffect> spread_effects(const Refit& refit) {
-  const Explanation& named = refit.judged.named;
-  std::vector<SpreadEffect> found;
-  if (!named.first.empty()) {
-    const double age = named.latency_from_rest_s, share = named.latency.share;
-    found.push_back({"pose_latency",
-                     named.latency.gain,
-                     {{"latency", age, std::max(0.0, 0.8 * named.latency.latency_s - kCoasting_s),
-                       1.2 * age, "s"},
-                      {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}},
-                     gained_by(refit, 1)});
-  }
-  if (named.lag.gain > 0) {
-    const double tau = named.lag.tau_s;
-    const double half = kNormal90 * std::hypot(named.lag.standard_error_s, kLagError * tau);
-    found.push_back({"motor_lag", named.lag.gain, {{"tau", tau, tau - half, tau + half, "s"}}, {}});
-  }
-  const std::vector<double>& last = refit.nested.back().scores;
-  if (named.slip.gain > 0) {
-    const double p = named.slip.probability, loss = named.slip.loss;
-    found.push_back(
-        {"slip_events",
-         named.slip.gain,
-         {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}},
-         difference(refit.slip_scores, last)});
-  }
-  for (const FoundSpread& spread : named.spreads) {
-    found.push_back({spread.row->effect, spread.fit.gain, spread.fit.estimates,
-                     difference(spread.scores, last), spread.fit.sessions});
-  }
-  if (named.grid_m > 0) {
-    const PoseGrid& grid = named.study().grid;
-    found.push_back(
-        {"pose_quantisation", grid.nats, {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}}, {}});
-  }
-  return found;
-}
-
 std::vector<SessionGain> named_sessions(const DiagnosisRequest& of, const Study& study,
                                         std::vector<SessionGain> gains) {
   for (std::size_t i = 0; i < study.size() && !gains.empty(); ++i) {
@@ -190,20 +138,26 @@ std::string sessions_text(const std::vector<SessionGain>& gains) {
   return text.empty() ? text : text + ".";
 }
 
-NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit,
-                         const SpreadEffect& found) {
+// Effects that widen the distribution rather than move it: their gain is that of the mixture.
+NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit, const FoundSpread& found) {
+  const Explanation& named = refit.judged.named;
   NamedEffect effect;
-  effect.name = found.name;
-  effect.confidence = confidence_of(found.gain, of.subject.least_gain);
-  effect.parameters = found.estimates;
-  effect.sessions = named_sessions(of, refit.judged.named.study(), found.sessions);
+  effect.name = found.effect;
+  effect.confidence = confidence_of(found.fit.gain, of.subject.least_gain);
+  effect.parameters = found.fit.estimates;
+  effect.sessions = named_sessions(of, named.study(), found.fit.sessions);
   effect.text = sessions_text(effect.sessions);
-  std::vector<double> gained = found.gained;
+  std::vector<double> gained;
+  if (contains(named.first, found.effect, &Signature::effect)) {
+    gained = gained_by(refit, 1);
+  } else if (!found.scores.empty()) {
+    gained = difference(found.scores, refit.nested.back().scores);
+  }
   if (gained.empty()) {
     // The gain is over all that the readings show; of the gap it can close what the means left.
-    const std::size_t trials = refit.judged.named.study().size();
+    const std::size_t trials = named.study().size();
     const double left = std::max(0.0, refit.floor - mean(refit.nested.back().scores));
-    const double per_trial = std::min(found.gain / static_cast<double>(trials), left);
+    const double per_trial = std::min(found.fit.gain / static_cast<double>(trials), left);
     effect.gap_after = -per_trial;
     gained.assign(trials, per_trial);
   } else {
@@ -274,8 +228,8 @@ std::vector<NamedEffect> named_effects(const DiagnosisRequest& of, const Refit& 
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {
     all.emplace_back(named.chosen[k].candidate.gain, named_mean(of, refit, k));
   }
-  for (const SpreadEffect& found : spread_effects(refit)) {
-    all.emplace_back(found.gain, named_spread(of, refit, found));
+  for (const FoundSpread& found : named.spreads) {
+    all.emplace_back(found.fit.gain, named_spread(of, refit, found));
   }
   std::ranges::stable_sort(all, [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<NamedEffect> effects;

@@ -23,15 +23,6 @@ struct ScreenedSize {
   std::string note;
 };
 
-ScreenedSize reported_of_spread(const SpreadRow* look, const Explanation& named) {
-  for (const FoundSpread& found : named.spreads) {
-    if (found.row != look) continue;
-    const Estimate& first = found.fit.estimates.front();
-    return {found.fit.gain, first.key, first.value, look->found};
-  }
-  return {0, "", 0, look->missing};
-}
-
 ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
                          const Explanation& named) {
   const auto note = [](std::string text) { return ScreenedSize{0, "", 0, std::move(text)}; };
@@ -39,11 +30,6 @@ ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
   if (of.predictor.excluded().count(name)) return note(of.predictor.excluded().at(name));
   if (kind_of(name) != name) return note("a second one, looked for beside the first");
   if (name == kPatchEffect) return note("no disc of floor promises enough to be simulated");
-  if (name == "slip_events") {
-    return {named.slip.gain, "probability", named.slip.probability,
-            named.slip.gain > 0 ? "by the tails of what is left"
-                                : "single drives are no outliers as slips would make them"};
-  }
   if (name == "pose_latency") {
     if (named.study().gaps.size() < kFewestGaps)
       return note("too few resting poses were read twice");
@@ -52,11 +38,12 @@ ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
             named.latency.gain > 0 ? "by readings that fall behind the next ones"
                                    : "readings of one resting pose agree"};
   }
-  const SpreadRow* look = of.subject.effects->row(name).spread;
-  if (look != nullptr) return reported_of_spread(look, named);
-  if (name == "pose_quantisation") {
-    return {named.grid_m > 0 ? named.study().grid.nats : 0, "step", named.grid_m,
-            named.grid_m > 0 ? "the positions lie on this grid" : "the positions lie on no grid"};
+  const EffectDiagnosis& row = of.subject.effects->row(name);
+  if (row.missing != nullptr) {
+    const FoundSpread* found = named.spread(name);
+    if (found == nullptr) return note(row.missing);
+    const Estimate& first = found->fit.estimates.front();
+    return {found->fit.gain, first.key, first.value, row.found};
   }
   if (name == "motor_lag" && named.lag.trials > 0) {
     return {named.lag.gain, "tau", named.lag.tau_s, "by the logged paths"};
@@ -66,31 +53,22 @@ ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
 
 void set_spreads(const DiagnosisRequest& of, const Refit& refit, Overrides* at) {
   const Explanation& named = refit.judged.named;
-  const auto set = [&](const std::string& key, double value) {
-    (*at)[of.table().row(key)] = value;
-  };
   NoiseEstimate noise = refit.noise ? *refit.noise : refit.nested.back().study.predictive_noise();
-  if (named.grid_m > 0) {
+  if (const FoundSpread* rounding = named.spread("pose_quantisation")) {
     // The readings' noise was measured with the rounding in it.
-    const double rounding2 = named.grid_m * named.grid_m / 12;
-    set("pose_quantisation.step", named.grid_m);
+    const double step_m = rounding->fit.estimates.front().value;
+    const double rounding2 = step_m * step_m / 12;
     noise.pose.position_m =
         std::sqrt(std::max(0.0, noise.pose.position_m * noise.pose.position_m - rounding2));
   }
   noise.pose.position_m = std::max(1e-5, noise.pose.position_m);
   noise.pose.heading_rad = std::max(1e-5, noise.pose.heading_rad);
-  for (const Signature& s : named.first) {
-    for (const auto& [key, value] : s.fixed) set(key, value);
-  }
   for (const FoundSpread& found : named.spreads) {
     for (const Estimate& e : found.fit.estimates) {
-      set(std::string(found.row->effect) + "." + e.key, e.value);
+      (*at)[of.table().row(found.effect + "." + e.key)] = e.value;
     }
   }
-  if (named.lag.gain > 0) set("motor_lag.tau", named.lag.tau_s);
-  if (named.slip.gain > 0) {
-    set("slip_events.probability", std::clamp(named.slip.probability, 0.0, 0.5));
-    set("slip_events.loss", std::clamp(named.slip.loss, 0.0, 1.0));
+  if (named.spread("slip_events") != nullptr) {
     noise.drive_common = named.slip.noise.drive_common;
     noise.drive_side = named.slip.noise.drive_side;
     // Without events in it the fitted speed has made up for those that were not omitted.

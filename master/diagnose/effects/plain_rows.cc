@@ -122,6 +122,8 @@ extern const EffectDiagnosis kSlipEvents = {
                 {{"probability", 100, " %"}, {"loss", 100, " %"}}},
     .short_phrases = ShortPhrases{"probability", 100, " %", "In % of the drives a side slips",
                                   nullptr, "Clean the treads and the floor"},
+    .found = "by the tails of what is left",
+    .missing = "single drives are no outliers as slips would make them",
 };
 
 // Looked for in readings that the next ones contradict (latency.h).
@@ -139,6 +141,8 @@ extern const EffectDiagnosis kPoseQuantisation = {
     .phrases = {"Positions are rounded to a grid of %1", {{"step", 1000, " mm"}}},
     .short_phrases =
         ShortPhrases{"step", 1000, " mm", "Positions are rounded to %", nullptr, "Log more digits"},
+    .found = "the positions lie on this grid",
+    .missing = "the positions lie on no grid",
 };
 
 }  // namespace gapfarm

@@ -12,8 +12,6 @@ const SpreadRow kSessionSpread = {
     .fit = fit_session_gains,
     .scores = scores_with_session_gains,
     .contaminates = contaminated_with_session,
-    .found = "by sessions that drive faster or slower as a whole",
-    .missing = "no session drives faster or slower as a whole than others",
     .by_session = true,
 };
 
@@ -26,6 +24,8 @@ extern const EffectDiagnosis kSessionGain = {
     .short_phrases = ShortPhrases{"spread", 100, " %", "The sessions' speeds differ by %", nullptr,
                                   "Begin every session alike: charged, and on a clean floor"},
     .spread = &kSessionSpread,
+    .found = "by sessions that drive faster or slower as a whole",
+    .missing = "no session drives faster or slower as a whole than others",
 };
 
 }  // namespace gapfarm

@@ -100,11 +100,7 @@ std::vector<double> scores_with_unsettled(const Study& study,
 const SpreadRow kUnsettledSpread = {
     "unsettled_start",
     14,  // as of late readings, searched on a grid; null logs stay below 8
-    fit_unsettled,
-    scores_with_unsettled,
-    follows_move,
-    "by drives that are turned after an unrecorded move",
-    "drives after an unrecorded move are outliers no more than others"};
+    fit_unsettled, scores_with_unsettled, follows_move};
 
 }  // namespace
 
@@ -116,6 +112,8 @@ extern const EffectDiagnosis kUnsettledStart = {
         ShortPhrases{"share", 100, " %", "% of the starts after moves were read too early", nullptr,
                      "Let go of the robot before its pose is read"},
     .spread = &kUnsettledSpread,
+    .found = "by drives that are turned after an unrecorded move",
+    .missing = "drives after an unrecorded move are outliers no more than others",
 };
 
 }  // namespace gapfarm

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "master/diagnose/result/diagnosis.h"
@@ -30,17 +31,17 @@ struct SpreadRow {
                                 const SpreadFit& fit, double outlier_share);
   bool (*contaminates)(
       const ResidualTrial& trial);  // whether it may be one that the effect strikes
-  const char* found;                // how screening says that it was seen, or not
-  const char* missing;
   // Each session has a gain of its own, which no statement about means may use, rather
   // than trials that show nothing of means.
   bool by_session = false;
 };
 
+// What was found in readings, single trials or sessions rather than in the mean of all drives.
 struct FoundSpread {
-  const SpreadRow* row;
+  std::string effect;
   SpreadFit fit;
-  std::vector<double> scores;  // held out, one a trial, of the last fit and the effect
+  const SpreadRow* row = nullptr;   // how it is looked for; null: by a step of its own
+  std::vector<double> scores = {};  // held out, one a trial, of the last fit and the effect
 };
 
 // The sessions' gains are drawn from a Gaussian about the base's speed.  Its standard deviation is

@@ -1,6 +1,5 @@
 #include "master/diagnose/evidence/slip.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,6 +28,7 @@ struct Event {
 std::vector<Event> events_of(double probability, double loss) {
   const double p = probability, q = 1 - probability;
   std::vector<Event> all = {{q * q, 0, 0}};
+  if (p == 0) return all;
   for (int i = 0; i < kNodes; ++i) {
     const double u = -loss * (i + 0.5) / kNodes;
     all.push_back({p * q / kNodes, u, 0});
@@ -40,60 +40,6 @@ std::vector<Event> events_of(double probability, double loss) {
     }
   }
   return all;
-}
-
-class Mixture {
- public:
-  Mixture(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
-          const std::vector<bool>& mask, const NoiseEstimate& noise)
-      : trials_(trials), residuals_(residuals), mask_(mask), noise_(noise) {}
-
-  double log_likelihood(double common, double side, double probability, double loss) const {
-    NoiseEstimate noise = noise_;
-    noise.drive_common = common;
-    noise.drive_side = side;
-    const std::vector<Event> events =
-        probability > 0 ? events_of(probability, loss) : std::vector<Event>{{1, 0, 0}};
-    std::vector<double> exponents(events.size());
-    double sum = 0;
-    for (std::size_t i = 0; i < trials_.size(); ++i) {
-      if (!mask_[i]) continue;
-      const ResidualTrial& t = trials_[i];
-      const Eigen::LLT<Eigen::Matrix3d> factor(trial_covariance(t, noise));
-      // The mean loss was taken out with the rest by the fit.
-      const Eigen::Vector3d centred = residuals_[i] - probability * loss / 2 * (t.left + t.right);
-      const auto lower = factor.matrixL();
-      const Eigen::Vector3d r = lower.solve(centred);
-      const Eigen::Vector3d left = lower.solve(t.left), right = lower.solve(t.right);
-      for (std::size_t k = 0; k < events.size(); ++k) {
-        exponents[k] = -0.5 * (r - events[k].left * left - events[k].right * right).squaredNorm();
-      }
-      // Far trials underflow in every event: measured from the nearest one.
-      const double greatest = *std::max_element(exponents.begin(), exponents.end());
-      double density = 0;
-      for (std::size_t k = 0; k < events.size(); ++k) {
-        density += events[k].weight * std::exp(exponents[k] - greatest);
-      }
-      sum += greatest + std::log(density) - factor.matrixLLT().diagonal().array().log().sum();
-    }
-    return sum;
-  }
-
- private:
-  std::span<const ResidualTrial> trials_;
-  std::span<const Eigen::Vector3d> residuals_;
-  const std::vector<bool>& mask_;
-  NoiseEstimate noise_;
-};
-
-double maximise(const std::function<double(const std::vector<double>&)>& f, int most,
-                std::vector<double>* x) {
-  return infer::climb(f,
-                      {.step = std::vector<double>(x->size(), 0.2),
-                       .x_tolerance = 0.02,
-                       .tolerance = 0.1,
-                       .evaluations = most},
-                      x);
 }
 
 constexpr double kPlaceStep_m = 0.1;
@@ -187,24 +133,53 @@ std::vector<Place> places(const std::vector<DrivenLine>& driven_lines) {
 
 SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
                  const std::vector<bool>& mask, const NoiseEstimate& start) {
+  std::vector<ResidualTrial> seen;
+  std::vector<Eigen::Vector3d> left;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    if (!mask[i]) continue;
+    seen.push_back(trials[i]);
+    left.push_back(residuals[i]);
+  }
+  // The mean loss was taken out with the rest by the fit.
+  const auto nats = [&](const SlipFit& fit) {
+    double sum = 0;
+    for (const SlipTrial& t :
+         trials_with_slips(seen, left, fit, fit.probability * fit.loss / 2, 0)) {
+      sum += t.score;
+    }
+    return sum;
+  };
   NoiseEstimate noise = start;
   noise.drive_common = std::max(noise.drive_common, kLeastDrive);
   noise.drive_side = std::max(noise.drive_side, kLeastDrive);
-  const Mixture mixture(trials, residuals, mask, noise);
+  // Logarithms of the drive's noise, then of the odds of a slip and of its greatest loss.
+  const auto at = [&](const std::vector<double>& x) {
+    SlipFit fit{0, 0, 0, noise};
+    fit.noise.drive_common = std::exp(x[0]);
+    fit.noise.drive_side = std::exp(x[1]);
+    if (x.size() == 2) return fit;
+    fit.probability = std::min(0.5, 1 / (1 + std::exp(-x[2])));
+    fit.loss = std::min(1.0, std::exp(x[3]));
+    return fit;
+  };
+  const auto maximise = [&](int most, std::vector<double>* x) {
+    return infer::climb([&](const std::vector<double>& tried) { return nats(at(tried)); },
+                        {.step = std::vector<double>(x->size(), 0.2),
+                         .x_tolerance = 0.02,
+                         .tolerance = 0.1,
+                         .evaluations = most},
+                        x);
+  };
   std::vector<double> plain = {std::log(noise.drive_common), std::log(noise.drive_side)};
-  const double base = maximise(
-      [&](const std::vector<double>& q) {
-        return mixture.log_likelihood(std::exp(q[0]), std::exp(q[1]), 0, 0);
-      },
-      40, &plain);
-  SlipFit fit;
-  fit.noise = noise;
+  const double base = maximise(40, &plain);
+  SlipFit fit{0, 0, 0, noise};
   for (double probability : {0.04, 0.1, 0.2, 0.4}) {
     for (double loss : {0.06, 0.12, 0.25, 0.5}) {
       for (double less : {1.0, 0.85}) {
-        const double gain = mixture.log_likelihood(less * noise.drive_common,
-                                                   less * noise.drive_side, probability, loss) -
-                            base;
+        SlipFit tried{0, probability, loss, noise};
+        tried.noise.drive_common *= less;
+        tried.noise.drive_side *= less;
+        const double gain = nats(tried) - base;
         if (gain > fit.gain) fit = {gain, probability, loss, noise};
       }
     }
@@ -212,20 +187,9 @@ SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::V
   if (fit.gain < kWorthFitting) return fit;
   std::vector<double> x = {plain[0], plain[1], std::log(fit.probability / (1 - fit.probability)),
                            std::log(fit.loss)};
-  const auto probability = [](const std::vector<double>& q) {
-    return std::min(0.5, 1 / (1 + std::exp(-q[2])));
-  };
-  const double best = maximise(
-      [&](const std::vector<double>& q) {
-        return mixture.log_likelihood(std::exp(q[0]), std::exp(q[1]), probability(q),
-                                      std::min(1.0, std::exp(q[3])));
-      },
-      120, &x);
-  fit.gain = std::max(fit.gain, best - base);
-  fit.probability = probability(x);
-  fit.loss = std::min(1.0, std::exp(x[3]));
-  fit.noise.drive_common = std::exp(x[0]);
-  fit.noise.drive_side = std::exp(x[1]);
+  const double gain = std::max(fit.gain, maximise(120, &x) - base);
+  fit = at(x);
+  fit.gain = gain;
   return fit;
 }
 

@@ -170,7 +170,6 @@ DiagnosisSubject push_subject() {
   DiagnosisSubject s;
   s.scenario = "push";
   s.effects = &push_effect_diagnoses();
-  s.looks = kLooksAtNothingElse;
   s.least_gain = 9;
   s.unknown_log10_p = -4.2;
   s.farthest = 4;

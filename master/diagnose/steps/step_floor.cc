@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
@@ -67,18 +68,15 @@ std::vector<NestedFit> with_tails(const DiagnosisRequest& of, const Tails& tails
 std::vector<double> scores_with_slips(const DiagnosisRequest& of, const Explanation& named,
                                       const NestedFit& last,
                                       const std::vector<std::size_t>& folds) {
-  std::vector<double> scores;
-  for (const SlipTrial& t :
-       trials_with_slips(named.study().trials, held_out_residuals(last.study, last.fit, folds),
-                         named.slip, mean_loss_of_slips(named), of.outlier_share())) {
-    scores.push_back(t.score);
-  }
-  return scores;
+  return mapped(
+      trials_with_slips(named.study().trials, held_out_residuals(last.study, last.fit, folds),
+                        named.slip, mean_loss_of_slips(named), of.outlier_share()),
+      &SlipTrial::score);
 }
 
 Judgement with_other_outliers(Judgement judged, const std::string& effect,
                               const char* what = "Single drives are outliers") {
-  const bool named = judged.named.names_anything() || judged.named.grid_m > 0;
+  const bool named = judged.named.names_anything();
   judged.verdict = named ? Verdict::kEffectAndUnknown : Verdict::kUnknown;
   judged.cautions.push_back(std::string(what) + ", but not as " + effect +
                             " would make them: nothing that was looked for explains them.");
@@ -87,7 +85,7 @@ Judgement with_other_outliers(Judgement judged, const std::string& effect,
 
 // They explain the scatter less well than a wider noise does: something else makes drives outliers.
 Judgement without_slips(Judgement judged) {
-  judged.named.slip = {};
+  judged.named.drop_spread("slip_events");
   return with_other_outliers(std::move(judged), "slips");
 }
 
@@ -95,10 +93,10 @@ Judgement without_slips(Judgement judged) {
 Judgement with_spreads_foreseen(const DiagnosisRequest& of, Judgement judged, const NestedFit& last,
                                 const std::vector<std::size_t>& folds) {
   std::vector<FoundSpread>& spreads = judged.named.spreads;
-  if (spreads.empty()) return judged;
   const double share = of.outlier_share();
   const std::vector<Eigen::Vector3d> residuals = held_out_residuals(last.study, last.fit, folds);
   for (FoundSpread& found : spreads) {
+    if (found.row == nullptr) continue;
     // What else was named was not yet explained when it was found.
     // Held out, a session follows the others' mean as well.
     SpreadFit beside =
@@ -108,6 +106,7 @@ Judgement with_spreads_foreseen(const DiagnosisRequest& of, Judgement judged, co
   }
   const SpreadRow* worthless = nullptr;
   std::erase_if(spreads, [&](const FoundSpread& found) {
+    if (found.row == nullptr) return false;
     // Where few trials are struck it is what each gains that shows, not how many do.
     const double gained =
         (mean(found.scores) - mean(last.scores)) * static_cast<double>(found.scores.size());
@@ -129,7 +128,7 @@ double within_reach(const DiagnosisRequest& of, const Refit& refit) {
   double reached = -INFINITY, more = 0;
   for (const NestedFit& n : refit.nested) reached = std::max(reached, mean(n.scores));
   for (const FoundSpread& found : judged.named.spreads) {
-    reached = std::max(reached, mean(found.scores));
+    if (found.row != nullptr) reached = std::max(reached, mean(found.scores));
   }
   for (const Leftover& l : judged.left) {
     if (l.log10_p < of.subject.unknown_log10_p) more = std::max(more, l.excess);
@@ -154,10 +153,11 @@ double mean_loss_of_slips(const Explanation& named) {
 
 Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std::size_t>& folds) {
   Judgement& judged = refit.judged;
-  const auto slips = [&] { return judged.named.slip.gain > 0; };
+  std::vector<double> with_slips;
+  const auto slips = [&] { return judged.named.spread("slip_events") != nullptr; };
   if (slips()) {
-    refit.slip_scores = scores_with_slips(of, judged.named, refit.nested.back(), folds);
-    if (!clearly_better(refit.slip_scores, refit.nested.back().scores)) {
+    with_slips = scores_with_slips(of, judged.named, refit.nested.back(), folds);
+    if (!clearly_better(with_slips, refit.nested.back().scores)) {
       judged = without_slips(std::move(judged));
     }
   }
@@ -166,7 +166,7 @@ Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std:
     auto tailed = with_tails(of, *tails, refit.nested, folds);
     // Whatever else makes single drives outliers has heavy tails, which explain it better than
     // slips.
-    if (slips() && !(mean(tailed.back().scores) > mean(refit.slip_scores))) {
+    if (slips() && !(mean(tailed.back().scores) > mean(with_slips))) {
       tails.reset();
     } else {
       if (slips()) judged = without_slips(std::move(judged));
@@ -176,10 +176,13 @@ Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std:
   const NestedFit& last = refit.nested.back();
   judged = with_spreads_foreseen(of, std::move(judged), last, folds);
   // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
-  refit.floor = slips() ? mean(refit.slip_scores)
+  refit.floor = slips() ? mean(with_slips)
                 : tails ? tails->perfect
                         : floor_score(last.study, of.outlier_share());
   refit.floor = std::max(refit.floor, within_reach(of, refit));
+  for (FoundSpread& found : judged.named.spreads) {
+    if (found.effect == "slip_events") found.scores = with_slips;
+  }
   return refit;
 }
 

@@ -15,6 +15,7 @@ namespace gapfarm::steps {
 namespace {
 
 constexpr double kLeastQuantum_m = 4e-4;
+constexpr const char* kRounding = "pose_quantisation";
 constexpr std::size_t kNearestAlone = 3;
 
 NearMiss near_miss(const DiagnosisRequest& of, std::vector<std::string> effects, double gain,
@@ -116,7 +117,7 @@ Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Ju
   const bool odd = !named.odd_readings.empty() || !named.odd_drives.empty();
   const double unknown = of.subject.unknown_log10_p;
   if (named.chosen.empty()) {
-    const bool others = named.names_anything() || named.grid_m > 0;
+    const bool others = named.names_anything();
     named.estimates.reset();
     const Regression left = explained_by(catalogue, named);
     judged.left = all_leftovers(named, left);
@@ -155,17 +156,24 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
       screening.explained ? *screening.explained : explained_nats(*screening.catalogue, explained);
   judged.left = all_leftovers(named, explained);
   judged.scale = leftover_scale(explained);
-  double nats = by_means + named.slip.gain + (named.as_logged ? named.latency.gain : 0);
-  for (const FoundSpread& found : named.spreads) nats += found.fit.gain;
-  const bool on_grid =
-      (of.subject.looks & kLooksForRounding) != 0 && named.study().grid.step_m > kLeastQuantum_m;
-  if (on_grid && !of.excluded("pose_quantisation")) named.grid_m = named.study().grid.step_m;
+  double nats = by_means;
+  for (const FoundSpread& found : named.spreads) {
+    // A lag's are of whole paths, not of ends.
+    if (found.effect != "motor_lag") nats += found.fit.gain;
+  }
+  const PoseGrid& grid = named.study().grid;
+  const bool on_grid = of.knows(kRounding) && grid.step_m > kLeastQuantum_m;
+  const bool names_grid = on_grid && !of.excluded(kRounding);
+  if (names_grid) {
+    named.spreads.push_back(
+        {kRounding, {grid.nats, {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}}}});
+  }
   const bool two = std::any_of(named.chosen.begin(), named.chosen.end(), [](const ChosenEffect& c) {
     return kind_of(c.candidate.signature.effect) != c.candidate.signature.effect;
   });
-  judged.verdict = judge_verdict(named.names_anything() || named.grid_m > 0, nats, judged.left,
+  judged.verdict = judge_verdict(named.names_anything(), nats, judged.left,
                                  of.subject.unknown_log10_p, two ? kWrongShareOfTwo : kWrongShare);
-  if (on_grid && named.grid_m == 0) {
+  if (on_grid && !names_grid) {
     named.odd_readings =
         "The logged positions lie on a grid, which nothing that was looked for explains.";
     if (judged.verdict == Verdict::kEffect) judged.verdict = Verdict::kEffectAndUnknown;
@@ -195,10 +203,8 @@ bool clearly_better(const std::vector<double>& scores, const std::vector<double>
 Explanation naming_nothing(Explanation explanation) {
   explanation.first.clear();
   explanation.chosen.clear();
-  explanation.slip = {};
   explanation.spreads.clear();
   explanation.lag = {};
-  explanation.grid_m = 0;
   if (!explanation.as_logged) return explanation;
   Evidence as_logged = *explanation.evidence;
   as_logged.study = std::move(*explanation.as_logged);
@@ -247,11 +253,16 @@ Judgement with_base_warning(const DiagnosisRequest& of, const Evidence& measured
 std::optional<SanityFinding> missing_too_much(const Refit& refit) {
   const Judgement& judged = refit.judged;
   // Means alone predict no session's gain.
-  const bool by_session = judged.named.names_session_gains() && !judged.named.spreads.empty();
-  const double gap = refit.floor - mean(by_session ? judged.named.spreads.back().scores
-                                                   : refit.nested.back().scores);
+  const auto& spreads = judged.named.spreads;
+  const auto sessions = std::ranges::find_if(
+      spreads, [](const FoundSpread& s) { return s.row != nullptr && s.row->by_session; });
+  const double gap =
+      refit.floor - mean(sessions != spreads.end() ? sessions->scores : refit.nested.back().scores);
   if (!judged.warnings.empty() || !(gap > kMostMissed)) return std::nullopt;
-  if (!judged.named.names_anything() && judged.verdict != Verdict::kNone) return std::nullopt;
+  // A grid closes next to nothing.
+  const bool names_more =
+      !judged.named.chosen.empty() || spreads.size() > (judged.named.spread(kRounding) ? 1U : 0U);
+  if (!names_more && judged.verdict != Verdict::kNone) return std::nullopt;
   return SanityFinding{"base_misses",
                        "Even with everything that the catalogue offers the model loses " +
                            plain_number(rounded_to_digits(gap, 3)) +

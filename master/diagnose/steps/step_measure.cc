@@ -1,9 +1,12 @@
 // The base, the noise and the evidence that later steps look at.
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/evidence/residuals.h"
@@ -17,6 +20,10 @@ constexpr int kLatencyRounds = 4;
 constexpr double kPathInterval_s = 0.005;
 constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
 constexpr double kLeastLagGain = 14;      // it stands for all samples of a path, which go together
+// For so long another robot may roll on by itself: what a late reading's age is counted from is its
+// recorder's secret.
+constexpr double kCoasting_s = 0.04;
+constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
 
 // Of every trial just before its motors stop, in the axes of its predicted end; none where that
 // cannot be simulated.
@@ -178,10 +185,6 @@ bool DiagnosisRequest::excluded(const std::string& effect) const {
   return contains(options.excluded, effect) || !contains(known, effect, &Effect::name);
 }
 
-bool DiagnosisRequest::looks_for(const std::string& effect, Looks look) const {
-  return (subject.looks & look) != 0 && !excluded(effect);
-}
-
 bool DiagnosisRequest::has_paths() const {
   return !problem.external || (problem.external->table.declaration().inputs & kExternalPath) != 0;
 }
@@ -198,8 +201,7 @@ double DiagnosisRequest::frame_of(const std::string& key, const Overrides& at) c
 // A late camera reads a pose before the motion has ended; the next reading shows it.
 Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial) {
   const Study& study = partial.study();
-  if ((of.subject.looks & kLooksForLateReadings) == 0 || study.gaps.size() < kFewestGaps)
-    return partial;
+  if (!of.knows("pose_latency") || study.gaps.size() < kFewestGaps) return partial;
   ASSIGN_OR_RETURN(const auto velocity, end_velocities(of, study));
   if (velocity.empty()) return partial;
   partial.latency = fit_latency(study, velocity);
@@ -217,14 +219,19 @@ Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanati
   std::vector<Eigen::Vector3d> late;
   for (const ResidualTrial& t : right->study().trials) late.push_back(t.late);
   s.columns = right->study().whiten(late);
-  s.fixed = {{"pose_latency.share", right->latency.share},
-             {"pose_latency.latency", right->latency_from_rest_s}};
   right->first.push_back(std::move(s));
+  const LatencyFit& found = right->latency;
+  const double age = right->latency_from_rest_s, share = found.share;
+  right->spreads.push_back(
+      {"pose_latency",
+       {found.gain,
+        {{"latency", age, std::max(0.0, 0.8 * found.latency_s - kCoasting_s), 1.2 * age, "s"},
+         {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}}}});
   return right;
 }
 
 Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial) {
-  if (!of.looks_for("motor_lag", kLooksForLag) || !of.has_paths()) return partial;
+  if (!of.knows("motor_lag") || of.excluded("motor_lag") || !of.has_paths()) return partial;
   auto lag = fit_path_lag(of.predictor, partial.study());
   if (!lag && lag.error().code == ErrorCode::kSimulation) {
     of.predictor.exclude("motor_lag");
@@ -233,6 +240,11 @@ Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial
   if (!lag) return lag.error();
   partial.lag = *lag;
   if (partial.lag.gain < kLeastLagGain) partial.lag.gain = 0;
+  if (partial.lag.gain == 0) return partial;
+  const double tau = partial.lag.tau_s;
+  const double half = kNormal90 * std::hypot(partial.lag.standard_error_s, kLagError * tau);
+  partial.spreads.push_back(
+      {"motor_lag", {partial.lag.gain, {{"tau", tau, tau - half, tau + half, "s"}}}});
   return partial;
 }
 

@@ -26,7 +26,7 @@ std::vector<bool> informative_about_slips(const DiagnosisRequest& of, const Expl
     const ResidualTrial& trial = study.trials[i];
     if (!partial.first.empty() && trial.context.moved) informative[i] = false;
     for (const FoundSpread& found : partial.spreads) {
-      if (found.row->contaminates(trial)) informative[i] = false;
+      if (found.row != nullptr && found.row->contaminates(trial)) informative[i] = false;
     }
     for (const ChosenEffect& effect : partial.chosen) {
       const Signature& chosen = effect.candidate.signature;
@@ -98,7 +98,7 @@ Explanation look_for_spreads(const DiagnosisRequest& of, Explanation partial,
     for (std::size_t i = 0; i < study.size(); ++i) {
       if (with[i] > without_it[i] + kStruck_nats) study.ignored[i] = true;
     }
-    partial.spreads.push_back({row, std::move(fit), {}});
+    partial.spreads.push_back({row->effect, std::move(fit), row});
   }
   return partial.spreads.size() == before ? partial : without(partial, study.ignored);
 }
@@ -116,14 +116,14 @@ Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation parti
     Eigen::MatrixXd nuisances = beside_sessions(study, partial.evidence->nuisances);
     partial.evidence = std::make_shared<const Evidence>(
         evidence_beside(std::move(study), std::move(nuisances), partial.evidence->blocks));
-    partial.spreads.push_back({row, std::move(fit), {}});
+    partial.spreads.push_back({row->effect, std::move(fit), row});
   }
   return partial;
 }
 
 Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
                            const Proposals& catalogue, const Regression& explained) {
-  if ((of.subject.looks & kLooksForSlips) == 0) return partial;
+  if (!of.knows("slip_events")) return partial;
   const Study& study = partial.study();
   const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
   const std::vector<bool> informative = informative_about_slips(of, partial);
@@ -142,7 +142,12 @@ Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
         "Single drives are outliers, most of them to where no slip would have led: nothing "
         "explains them that was looked for.";
   } else if (gathering.gain < kLeastGathering) {
+    const double p = slip.probability, loss = slip.loss;
     partial.slip = slip;
+    partial.spreads.push_back({"slip_events",
+                               {slip.gain,
+                                {{"probability", p, 0.6 * p, 1.6 * p, "-"},
+                                 {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}}}});
   } else {
     partial.odd_drives = "Single drives are outliers, most of them " + gathering.where +
                          ": something lies there that nothing explains which was looked for.";

@@ -81,7 +81,7 @@ Result<Screening> choose_without_slips(const DiagnosisRequest& of, Screening scr
 Result<Screening> look_for_slips_and_choose(const DiagnosisRequest& of, Screening screening) {
   const Regression explained = explained_by(*screening.catalogue, screening.found);
   screening.found = look_for_slips(of, std::move(screening.found), *screening.catalogue, explained);
-  if (!(screening.found.slip.gain > 0)) return screening;
+  if (screening.found.spread("slip_events") == nullptr) return screening;
   const Explanation before = screening.found;
   const Proposals all = *screening.catalogue;  // refers to the evidence of before
   auto rest = choose_without_slips(of, std::move(screening), explained, {});
@@ -93,7 +93,7 @@ Result<Screening> look_for_slips_and_choose(const DiagnosisRequest& of, Screenin
   rest->found = before;
   rest = choose_without_slips(of, std::move(*rest), explained, gathering->passed);
   if (!rest) return rest;
-  rest->found.slip = {};
+  rest->found.drop_spread("slip_events");
   rest->found = look_for_slips(of, rest->found, all, explained_by(all, rest->found));
   return rest;
 }
@@ -156,7 +156,7 @@ Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explana
 // Whether sessions differ beside what was chosen, too, as clearly as it takes to name that.
 bool sessions_still_differ(const DiagnosisRequest& of, const Explanation& found) {
   for (const FoundSpread& spread : found.spreads) {
-    if (!spread.row->by_session) continue;
+    if (spread.row == nullptr || !spread.row->by_session) continue;
     return found.chosen.empty() ||
            spread.row->fit(found.study(), left_with_sessions(found), of.outlier_share()).gain >=
                spread.row->least_gain;

@@ -178,8 +178,8 @@ Refit add_shape(const DiagnosisRequest& of, const Refit& refit) {
   const Verdict verdict = refit.judged.verdict;
   const bool unexplained = verdict == Verdict::kUnknown || verdict == Verdict::kEffectAndUnknown;
   // A lag found in paths is in the model that is written, but not in these fits.
-  const bool possible =
-      scenario_form(of.problem.scenario).residual && refit.judged.named.lag.gain == 0;
+  const bool possible = scenario_form(of.problem.scenario).residual &&
+                        refit.judged.named.spread("motor_lag") == nullptr;
   if (!unexplained || !possible) return with;
   FoundResidual& found = with.shape.emplace();
   found.text = residual_sentence(found);

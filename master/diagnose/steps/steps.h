@@ -36,7 +36,8 @@ struct DiagnosisRequest {
   double outlier_share() const { return problem.fitness.outlier_share; }
   // As asked, or because the scenario's table has no such effect.
   bool excluded(const std::string& effect) const;
-  bool looks_for(const std::string& effect, Looks look) const;
+  // Whether it has a row among the scenario's.
+  bool knows(const std::string& effect) const { return subject.effects->find(effect) != nullptr; }
   // Whether poses on the way are known: some programs answer where a drive ends alone.
   bool has_paths() const;
   // Of a table key that is a place along a world axis: how far the log's frame lies along it.
@@ -64,9 +65,9 @@ struct Explanation {
   std::vector<Signature> first;    // explained before anything else: late readings
   std::optional<Study> as_logged;  // where they were put right: the study before that
   PathLag lag;
-  SlipFit slip;
-  std::vector<FoundSpread> spreads;  // what else makes trials outliers
-  double grid_m = 0;                 // of the positions, once it is named
+  SlipFit slip;  // of the slips that are named
+  // What is named of readings, single trials and sessions.
+  std::vector<FoundSpread> spreads;
   std::vector<ChosenEffect> chosen;
   std::optional<JointFit> estimates;  // of these, base held, beside nuisances
   Overrides searched_error;  // standard errors with the base free, where it was searched too
@@ -75,16 +76,20 @@ struct Explanation {
   std::string odd_drives;    // the same of outlier drives in one place
 
   const Study& study() const { return evidence->study; }
-  bool names_a_spread() const { return slip.gain > 0 || !spreads.empty(); }
   bool names_session_gains() const { return study().session_spread > 0; }
+  const FoundSpread* spread(const std::string& effect) const {
+    const auto at = std::ranges::find(spreads, effect, &FoundSpread::effect);
+    return at == spreads.end() ? nullptr : &*at;
+  }
+  void drop_spread(const std::string& effect) {
+    std::erase_if(spreads, [&](const FoundSpread& s) { return s.effect == effect; });
+  }
   bool names_outliers() const {
-    return slip.gain > 0 || std::any_of(spreads.begin(), spreads.end(),
-                                        [](const FoundSpread& s) { return !s.row->by_session; });
+    return std::ranges::any_of(spreads, [](const FoundSpread& s) {
+      return s.row != nullptr ? !s.row->by_session : s.effect == "slip_events";
+    });
   }
-  // But for the grid, which closes next to nothing.
-  bool names_anything() const {
-    return !first.empty() || !chosen.empty() || names_a_spread() || lag.gain > 0;
-  }
+  bool names_anything() const { return !chosen.empty() || !spreads.empty(); }
 };
 
 // Of each effect that was not chosen: Screened::detectable_from.
@@ -132,7 +137,6 @@ struct Refit {
   // Base alone; with late readings put right, where there are any; with the first effect, with the
   // first two, ...; with a correction by effects that are not named.
   std::vector<NestedFit> nested;
-  std::vector<double> slip_scores;     // held out, of the last fit and slips
   double floor = 0;                    // what a perfect prediction would score
   std::string correction;              // what is reported of that; empty: there is none
   std::optional<JointFit> final_fit;   // base and effects as they are reported

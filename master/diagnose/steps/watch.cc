@@ -95,13 +95,13 @@ void emit_noise(const DiagnosisRequest& of, const Study& study) {
 void emit_readings(const DiagnosisRequest& of, const Explanation& found) {
   if (!watched(of)) return;
   Finding finding{"readings and single drives", "", {}, {}};
-  if (found.latency.gain > 0 && !found.first.empty()) {
+  if (found.spread("pose_latency") != nullptr) {
     finding.text += fmt::format("{} % of the poses were read late. ",
                                 plain_number(rounded_to_digits(100 * found.latency.share, 2)));
   }
-  if (found.lag.gain > 0)
+  if (found.spread("motor_lag") != nullptr)
     finding.text += "Paths show motors that lag by " + three_digits(found.lag.tau_s) + " s. ";
-  if (found.slip.gain > 0) {
+  if (found.spread("slip_events") != nullptr) {
     finding.text += fmt::format("In {} % of the drives a side slips. ",
                                 plain_number(rounded_to_digits(100 * found.slip.probability, 2)));
   }
@@ -153,9 +153,7 @@ void emit_choice(const DiagnosisRequest& of, const Explanation& found, bool has_
   if (!watched(of)) return;
   std::vector<std::string> names;
   for (const ChosenEffect& c : found.chosen) names.push_back(c.candidate.signature.effect);
-  for (const Signature& s : found.first) names.push_back(s.effect);
-  if (found.lag.gain > 0) names.emplace_back("motor_lag");
-  if (found.slip.gain > 0) names.emplace_back("slip_events");
+  for (const FoundSpread& s : found.spreads) names.push_back(s.effect);
   Finding finding{"what explains the gap", "", {}, {}};
   finding.text = has_warnings
                      ? "The base is in question, so nothing of the catalogue is looked for."

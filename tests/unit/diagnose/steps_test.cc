@@ -299,7 +299,7 @@ TEST(Steps, WhereNothingIsNamedReadingsAreAsLogged) {
   Measured m;
   m.found.as_logged = m.found.study();
   m.found.as_logged->trials[0].residual.x() += 0.5;
-  m.found.lag.gain = 20;
+  m.found.spreads.push_back({"motor_lag", {20, {}}});
   const steps::Explanation nothing = naming_nothing(m.found);
   EXPECT_FALSE(nothing.names_anything());
   EXPECT_EQ(nothing.study().trials[0].residual, m.found.as_logged->trials[0].residual);
