@@ -16,16 +16,14 @@ constexpr double kNoDensity = -1e3;
 constexpr int kMostEvaluations = 350;
 constexpr int kMostToMove = 120;  // from where all trials led
 
-// What a search moves, each with its bounds and first step: logarithms of the noise, then the
-// outliers' values.
+// What a search moves: logarithms of the noise, then the outliers' values.
 struct Search {
-  std::vector<double> x, lower, upper, step;
+  std::vector<double> x;
+  infer::Climb how = {.subplex = true, .x_tolerance = 0.003, .tolerance = 0.05};
 
   void add(double first, double lo, double hi, double by) {
     x.push_back(std::clamp(first, lo, hi));
-    lower.push_back(lo);
-    upper.push_back(hi);
-    step.push_back(by);
+    how.add(lo, hi, by);
   }
 };
 
@@ -142,15 +140,9 @@ struct Likelihood {
 
 // The nearest hill's top.
 double climb(const Likelihood& likelihood, int most, Search* from) {
+  from->how.evaluations = most;
   return infer::climb([&](const std::vector<double>& x) { return likelihood.at(x.data()); },
-                      {.subplex = true,
-                       .lower = from->lower,
-                       .upper = from->upper,
-                       .step = from->step,
-                       .x_tolerance = 0.003,
-                       .tolerance = 0.05,
-                       .evaluations = most},
-                      &from->x);
+                      from->how, &from->x);
 }
 
 OutlierFit climbed(const Likelihood& likelihood, int most, const OutlierFit& from) {

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "common/math/statistics.h"
@@ -26,100 +27,42 @@ constexpr double kCore = 0.7;  // a heavy-tailed core over the Gaussian that cov
 constexpr double kNoDensity = -1e3;
 constexpr unsigned kFloorDraws = 16;  // a trial: of 500 trials the mean is known to 0.02
 
-struct TailLikelihood {
-  std::span<const ResidualTrial> trials;
-  std::span<const Eigen::Vector3d> residuals;
-  const DiagnosisSubject& subject;
-  double outlier_share;
-
-  // Logarithms of both drives' and the readings' noise, then both tails or nothing.
-  static NoiseEstimate at(const double* x, unsigned count) {
-    NoiseEstimate noise;
+// The nearest hill's top from a noise whose zeros are unknown, over both drives' parts, with `pose`
+// the readings' and with `tails` both tails; `most`: of a deviation, and of a reading's position.
+NoiseEstimate climb(const std::function<double(const NoiseEstimate&)>& nats,
+                    const NoiseEstimate& start, bool pose, bool tails, double most,
+                    double most_position_m, infer::Climb how) {
+  const auto at = [&](const std::vector<double>& x) {
+    NoiseEstimate noise = start;
     noise.drive_common = std::exp(x[0]);
     noise.drive_side = std::exp(x[1]);
-    noise.pose = {std::exp(x[2]), std::exp(x[3])};
-    if (count > 4) noise.tails = {x[4], x[5]};
+    if (pose) noise.pose = {std::exp(x[2]), std::exp(x[3])};
+    noise.tails = tails ? NoiseTails{x[4], x[5]} : NoiseTails{};
     return noise;
-  }
-
-  double nats(const NoiseEstimate& noise) const {
-    const std::vector<double> scores =
-        predictive_scores(trials, residuals, noise, subject, outlier_share);
-    return std::accumulate(scores.begin(), scores.end(), 0.0);
-  }
-};
-
-// The nearest hill's top.
-NoiseFit climb(const TailLikelihood& likelihood, const NoiseEstimate& from, bool tails) {
-  const auto first = [](double value, double unknown, double most) {
-    return std::log(std::clamp(value > 0 ? value : unknown, kLeastDeviation, most));
   };
-  std::vector<double> x = {first(from.drive_common, 0.01, kMostDeviation),
-                           first(from.drive_side, 0.01, kMostDeviation),
-                           first(from.pose.position_m, 0.0015, kMostPosition_m),
-                           first(from.pose.heading_rad, 0.008, kMostDeviation)};
-  std::vector<double> lower(4, std::log(kLeastDeviation)),
-      upper = {std::log(kMostDeviation), std::log(kMostDeviation), std::log(kMostPosition_m),
-               std::log(kMostDeviation)},
-      step(4, 0.3);
-  if (tails) {
-    x.insert(x.end(), {kFirstTail, kFirstTail});
-    lower.insert(lower.end(), {0, 0});
-    upper.insert(upper.end(), {kMostTail, kMostTail});
-    step.insert(step.end(), {0.15, 0.15});
-  }
-  // A simplex that has shrunk begins once more.
-  const auto nats = [&](const std::vector<double>& at) {
-    return likelihood.nats(TailLikelihood::at(at.data(), static_cast<unsigned>(at.size())));
+  std::vector<double> x;
+  const auto add = [&](double value, double unknown, double greatest) {
+    x.push_back(std::log(std::clamp(value > 0 ? value : unknown, kLeastDeviation, greatest)));
+    how.add(std::log(kLeastDeviation), std::log(greatest), 0.3);
   };
-  for (int round = 0; round < 2; ++round) {
-    infer::climb(nats,
-                 {.lower = lower,
-                  .upper = upper,
-                  .step = step,
-                  .x_tolerance = 0.01,
-                  .tolerance = 0.05,
-                  .evaluations = tails ? 250 : 150},
-                 &x);
+  // An unknown value begins at that of a small tracked robot under a good camera.
+  add(start.drive_common, 0.01, most);
+  add(start.drive_side, 0.01, most);
+  if (pose) {
+    add(start.pose.position_m, 0.0015, most_position_m);
+    add(start.pose.heading_rad, 0.008, most);
   }
-  NoiseFit fit{TailLikelihood::at(x.data(), static_cast<unsigned>(x.size())), 0};
-  fit.nats = likelihood.nats(fit.noise);
-  return fit;
+  for (const double tail : {start.tails.drive, start.tails.reading}) {
+    if (!tails) break;
+    x.push_back(start.tails.gaussian() ? kFirstTail : tail);
+    how.add(0, kMostTail, 0.15);
+  }
+  infer::climb([&](const std::vector<double>& tried) { return nats(at(tried)); }, how, &x);
+  return at(x);
 }
 
 constexpr double kMost = 0.5;
 constexpr double kTailFromSquared = 14;  // chi-square with 3 degrees of freedom: one in 340
-
-struct Likelihood {
-  std::span<const ResidualTrial> trials;
-  std::span<const Eigen::Vector3d> residuals;
-  NoiseEstimate start;
-  bool fit_pose;
-  CovarianceOf covariance;
-  double tail;
-
-  NoiseEstimate at(const std::vector<double>& log_values) const {
-    NoiseEstimate noise = start;
-    noise.drive_common = std::exp(log_values[0]);
-    noise.drive_side = std::exp(log_values[1]);
-    if (fit_pose) noise.pose = {std::exp(log_values[2]), std::exp(log_values[3])};
-    return noise;
-  }
-
-  double nats(const NoiseEstimate& noise) const {
-    double sum = 0;
-    for (std::size_t i = 0; i < trials.size(); ++i) {
-      const Eigen::Matrix3d cov = covariance(trials[i], noise);
-      const double d2 = residuals[i].dot(cov.inverse() * residuals[i]);
-      const double bounded =
-          d2 > kTailFromSquared
-              ? kTailFromSquared + tail * std::log1p((d2 - kTailFromSquared) / tail)
-              : d2;
-      sum -= 0.5 * (std::log(cov.determinant()) + bounded);
-    }
-    return sum;
-  }
-};
 
 }  // namespace
 
@@ -181,7 +124,11 @@ NoiseFit fit_predictive_noise(std::span<const ResidualTrial> trials,
                               std::span<const Eigen::Vector3d> residuals,
                               const NoiseEstimate& start, const DiagnosisSubject& subject,
                               double outlier_share, bool tails) {
-  const TailLikelihood likelihood{trials, residuals, subject, outlier_share};
+  const auto nats = [&](const NoiseEstimate& noise) {
+    const std::vector<double> scores =
+        predictive_scores(trials, residuals, noise, subject, outlier_share);
+    return std::accumulate(scores.begin(), scores.end(), 0.0);
+  };
   NoiseEstimate core = start;
   if (tails) {
     core.drive_common *= kCore;
@@ -196,9 +143,18 @@ NoiseFit fit_predictive_noise(std::span<const ResidualTrial> trials,
   driven.drive_side =
       std::hypot(core.drive_side, std::sqrt(2.0) * core.pose.heading_rad / std::max(turn, 1e-3));
   driven.pose.heading_rad /= 4;
-  const NoiseFit by_readings = climb(likelihood, core, tails);
-  const NoiseFit by_drives = climb(likelihood, driven, tails);
-  return by_drives.nats > by_readings.nats ? by_drives : by_readings;
+  NoiseFit best{{}, -INFINITY};
+  for (const NoiseEstimate& from : {core, driven}) {
+    NoiseFit fit{from, 0};
+    // A simplex that has shrunk begins once more.
+    for (int round = 0; round < 2; ++round) {
+      fit.noise = climb(nats, fit.noise, true, tails, kMostDeviation, kMostPosition_m,
+                        {.x_tolerance = 0.01, .tolerance = 0.05, .evaluations = tails ? 250 : 150});
+    }
+    fit.nats = nats(fit.noise);
+    if (fit.nats > best.nats) best = fit;
+  }
+  return best;
 }
 
 std::vector<double> predictive_scores(std::span<const ResidualTrial> trials,
@@ -236,24 +192,21 @@ NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
                                 std::span<const Eigen::Vector3d> residuals,
                                 const NoiseEstimate& start, bool fit_pose, CovarianceOf covariance,
                                 double tail) {
-  const Likelihood likelihood{trials, residuals, start, fit_pose, covariance, tail};
-  // An unknown value (0) begins at that of a small tracked robot under a good camera.
-  const auto first = [](double value, double unknown) {
-    return std::log(std::clamp(value > 0 ? value : unknown, kLeastDeviation, kMost));
+  const auto nats = [&](const NoiseEstimate& noise) {
+    double sum = 0;
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      const Eigen::Matrix3d cov = covariance(trials[i], noise);
+      const double d2 = residuals[i].dot(cov.inverse() * residuals[i]);
+      const double bounded =
+          d2 > kTailFromSquared
+              ? kTailFromSquared + tail * std::log1p((d2 - kTailFromSquared) / tail)
+              : d2;
+      sum -= 0.5 * (std::log(cov.determinant()) + bounded);
+    }
+    return sum;
   };
-  std::vector<double> x = {first(start.drive_common, 0.01), first(start.drive_side, 0.01)};
-  if (fit_pose) {
-    x.push_back(first(start.pose.position_m, 0.0015));
-    x.push_back(first(start.pose.heading_rad, 0.008));
-  }
-  infer::climb([&](const std::vector<double>& at) { return likelihood.nats(likelihood.at(at)); },
-               {.lower = std::vector<double>(x.size(), std::log(kLeastDeviation)),
-                .upper = std::vector<double>(x.size(), std::log(kMost)),
-                .step = std::vector<double>(x.size(), 0.3),
-                .x_tolerance = 0.005,
-                .evaluations = 300},
-               &x);
-  return likelihood.at(x);
+  return climb(nats, start, fit_pose, /*tails=*/false, kMost, kMost,
+               {.x_tolerance = 0.005, .evaluations = 300});
 }
 
 }  // namespace gapfarm
