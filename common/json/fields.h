@@ -47,6 +47,29 @@ class FieldWriter {
   void if_any(const char* key, const std::optional<double>& number) {
     if (number) field(key, *number);
   }
+  template <class T>
+  void if_any(const char* key, const std::vector<T>& items) {
+    if (!items.empty()) field(key, items);
+  }
+  // One of these names, or several, by their places.
+  template <class Place>
+  void name_of(const char* key, const Place& place, const std::vector<std::string>& names) {
+    field(key, names[static_cast<std::size_t>(place)]);
+  }
+  void name_of(const char* key, const std::vector<std::size_t>& places,
+               const std::vector<std::string>& names) {
+    Json& list = json_[key] = Json::array();
+    for (const std::size_t place : places) list.push_back(names[place]);
+  }
+  template <class Row, class Describe>
+  void object(const char* key, const Row& row, const Describe& describe) {
+    field(key, written(row, describe));
+  }
+  template <class Row, class Describe>
+  void object_if_any(const char* key, const Row& row, const Describe& describe) {
+    Json object = written(row, describe);
+    if (!object.empty()) field(key, std::move(object));
+  }
   template <class T, std::size_t n, class Name>
   void choice(const char* key, const T& value, const T (&)[n], const Name& name_of) {
     field(key, name_of(value));
@@ -57,9 +80,15 @@ class FieldWriter {
     Json& object = json_[key] = Json::object();
     for (const Row& row : rows) object[row.*key_of] = written(row, describe);
   }
-  void by_key(const char* key, const std::vector<std::pair<std::string, double>>& numbers) {
+  template <class Row, class Key, class Value>
+  void by_key(const char* key, const std::vector<Row>& rows, Key Row::*key_of,
+              Value Row::*value_of) {
     Json& object = json_[key] = Json::object();
-    for (const auto& [name, number] : numbers) object[name] = number;
+    for (const Row& row : rows) object[row.*key_of] = row.*value_of;
+  }
+  void by_key(const char* key, const std::vector<std::pair<std::string, double>>& numbers) {
+    using Number = std::pair<std::string, double>;
+    by_key(key, numbers, &Number::first, &Number::second);
   }
 
   template <class Row, class Describe>

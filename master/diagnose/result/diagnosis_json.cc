@@ -96,13 +96,33 @@ constexpr auto kParameter = [](auto& v, auto& row) {
   IF_ANY(note);
 };
 
-// What stands before the gap, and behind it.
-constexpr auto kBeforeGap = [](auto& v, auto& row) {
+// Paths as [t s, x m, y m, heading rad] from the start.
+constexpr auto kDrive = [](auto& v, auto& row) {
+  FIELDS(trial, why);
+  IF_ANY(measured, tuned);
+  v.if_any("final", row.final_);
+};
+constexpr auto kShown = [](auto& v, auto& row) { FIELDS(key, label, matches); };
+// How they describe the trials, where not of driven commands.
+constexpr auto kPictures = [](auto& v, auto& row) {
+  v.if_any("ends", row.labels.ends);
+  v.if_any("residuals", row.labels.residuals);
+  v.if_any("x", row.labels.x);
+  v.if_any("y", row.labels.y);
+  v.list_if_any("shown", row.shown, kShown);
+};
+constexpr auto kGap = [](auto& v, auto& row) {
+  std::string unit = "nats/trial";
+  v.later("unit", unit);
+  kFigures(v, row.gap);
+  v.object_if_any("position_mm", row.position_mm, kFigures);
+  v.object_if_any("heading_mrad", row.heading_mrad, kFigures);
+};
+constexpr auto kDiagnosis = [](auto& v, auto& row) {
   LATER(headline, action, findings);
   v.list("sanity", row.sanity, kSanity);
   v.list("effects", row.effects, kEffect);
-};
-constexpr auto kBehindGap = [](auto& v, auto& row) {
+  v.object("gap", row, kGap);
   v.list("parameters", row.parameters, kParameter);
   v.list("correlations", row.correlations, kCorrelation);
   v.list("where", row.where, kWhere);
@@ -115,23 +135,11 @@ constexpr auto kBehindGap = [](auto& v, auto& row) {
   v.list("provenance", row.provenance, kProvenance);
   v.list("timing", row.timing_s, kTiming);
 };
-
-void read_gap(const Json& json, Fields& root, Diagnosis& diagnosis) {
-  if (!json.contains("gap")) return root.complain("gap", Json(), "an object");
-  const Json& gap = json["gap"];
-  const auto read = [&](const Json& from, const std::string& path, GapFigures& into) {
-    Fields fields(from, path, root.error());
-    kFigures(fields, into);
-  };
-  read(gap, "gap", diagnosis.gap);
-  if (!gap.is_object()) return;
-  if (gap.contains("position_mm")) {
-    read(gap["position_mm"], "gap.position_mm", diagnosis.position_mm);
-  }
-  if (gap.contains("heading_mrad")) {
-    read(gap["heading_mrad"], "gap.heading_mrad", diagnosis.heading_mrad);
-  }
-}
+constexpr auto kLast = [](auto& v, auto& row) {
+  v.list_if_any("nearest", row.nearest, kNearMiss);
+  v.list_if_any("drives", row.drives, kDrive);
+  v.object_if_any("pictures", row, kPictures);
+};
 
 }  // namespace
 
@@ -143,6 +151,10 @@ Json parameters_json(const std::vector<ParameterRow>& rows) {
   return FieldWriter::list(rows, kParameter);
 }
 
+Json drives_json(const std::vector<ShownDrive>& drives) {
+  return FieldWriter::list(drives, kDrive);
+}
+
 const char* verdict_name(Verdict verdict) {
   for (const auto& [value, name] : kVerdicts) {
     if (value == verdict) return name;
@@ -151,20 +163,10 @@ const char* verdict_name(Verdict verdict) {
 }
 
 Json summary_json(const Diagnosis& diagnosis) {
-  Json gap = {{"unit", "nats/trial"}};
-  gap.update(FieldWriter::written(diagnosis.gap, kFigures));
-  gap["position_mm"] = FieldWriter::written(diagnosis.position_mm, kFigures);
-  gap["heading_mrad"] = FieldWriter::written(diagnosis.heading_mrad, kFigures);
   Json summary = {{"version", kVersion}, {"verdict", verdict_name(diagnosis.verdict)}};
-  summary.update(FieldWriter::written(diagnosis, kBeforeGap));
-  summary["gap"] = std::move(gap);
-  summary.update(FieldWriter::written(diagnosis, kBehindGap));
+  summary.update(FieldWriter::written(diagnosis, kDiagnosis));
   if (diagnosis.residual) summary["residual"] = residual_json(*diagnosis.residual);
-  if (!diagnosis.nearest.empty()) {
-    summary["nearest"] = FieldWriter::list(diagnosis.nearest, kNearMiss);
-  }
-  if (!diagnosis.drives.empty()) summary["drives"] = drives_json(diagnosis.drives);
-  if (!diagnosis.shown.empty()) summary["pictures"] = pictures_json(diagnosis);
+  summary.update(FieldWriter::written(diagnosis, kLast));
   return summary;
 }
 
@@ -204,19 +206,11 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
     root.complain("verdict", json["verdict"], "effect, none, unknown, effect+unknown or unusable");
   }
   if (!error.empty()) return Error{error};
-  kBeforeGap(root, diagnosis);
-  read_gap(json, root, diagnosis);
-  kBehindGap(root, diagnosis);
-  root.list("nearest", diagnosis.nearest, kNearMiss);
+  kDiagnosis(root, diagnosis);
+  kLast(root, diagnosis);
   if (!error.empty()) return Error{error};
   if (json.contains("residual")) {
     if (Status s = read_residual(json["residual"], &diagnosis.residual); !s) return s.error();
-  }
-  if (json.contains("drives")) {
-    if (Status s = read_drives(json["drives"], &diagnosis.drives); !s) return s.error();
-  }
-  if (json.contains("pictures")) {
-    if (Status s = read_pictures(json["pictures"], &diagnosis); !s) return s.error();
   }
   if (json.contains("trials")) {
     auto trials = parse_trials(json["trials"], diagnosis.shown);

@@ -32,18 +32,11 @@ Json trials_json(const Diagnosis& diagnosis, int digits = 0);
 Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
                                                  const std::vector<ShownCovariate>& shown);
 
-// How the pictures describe the trials, where not of driven commands; and back.
-Json pictures_json(const Diagnosis& diagnosis);
-Status read_pictures(const Json& pictures, Diagnosis* diagnosis);
-
 // The correction without a cause; and back.
 Json residual_json(const FoundResidual& residual);
 Status read_residual(const Json& json, std::optional<FoundResidual>* residual);
 
 Json parameters_json(const std::vector<ParameterRow>& rows);
-
-// Drives beside their simulations (paths as [t s, x m, y m, heading rad] from the start); and back.
 Json drives_json(const std::vector<ShownDrive>& drives);
-Status read_drives(const Json& json, std::vector<ShownDrive>* drives);
 
 }  // namespace gapfarm

@@ -1,6 +1,9 @@
 // Reads what a FieldWriter wrote (common/json/fields.h), with an error that names the place.
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
+#include <concepts>
 #include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -11,8 +14,24 @@
 
 #include "common/json/fields.h"
 #include "common/json/json.h"
+#include "common/trials/trial.h"
+
+// A list a row.
+template <>
+struct nlohmann::adl_serializer<Eigen::MatrixXd> {
+  static void to_json(gapfarm::Json& json, const Eigen::MatrixXd& matrix) {
+    json = gapfarm::Json::array();
+    for (const auto& row : matrix.rowwise()) {
+      json.push_back(std::vector<double>(row.begin(), row.end()));
+    }
+  }
+};
 
 namespace gapfarm {
+
+inline void to_json(Json& json, const PathSample& s) {
+  json = {s.t_s, s.pose.x, s.pose.y, s.pose.theta};
+}
 
 // Reads fields of one object; the first thing that does not fit is kept as a sentence.
 class Fields {
@@ -60,10 +79,8 @@ class Fields {
     });
   }
   void by_key(const char* key, std::vector<std::pair<std::string, double>>& numbers) {
-    for_each(key, [&](const auto& item, const std::string&, const std::string& item_key) {
-      convert((std::string(key) + "." + item_key).c_str(), item,
-              numbers.emplace_back(item_key, 0).second);
-    });
+    using Number = std::pair<std::string, double>;
+    by_key(key, numbers, &Number::first, &Number::second);
   }
   template <class Row, class Describe>
   void list(const char* key, std::vector<Row>& rows, const Describe& describe) {
@@ -76,6 +93,42 @@ class Fields {
   template <class Row, class Describe>
   void list_if_any(const char* key, std::vector<Row>& rows, const Describe& describe) {
     list(key, rows, describe);
+  }
+
+  // Numbers, texts or lists in an object, each under its own key.
+  template <class Row, class Key, class Value>
+  void by_key(const char* key, std::vector<Row>& rows, Key Row::*key_of, Value Row::*value_of) {
+    for_each(key, [&](const auto& item, const std::string&, const std::string& item_key) {
+      Row& row = rows.emplace_back();
+      row.*key_of = item_key;
+      convert((std::string(key) + "." + item_key).c_str(), item, row.*value_of);
+    });
+  }
+  // One of these names, or several, by their places.
+  template <class Place>
+  void name_of(const char* key, Place& field, const std::vector<std::string>& names) {
+    std::string found;
+    this->field(key, found);
+    field = place_of(key, found, names, field);
+  }
+  void name_of(const char* key, std::vector<std::size_t>& field,
+               const std::vector<std::string>& names) {
+    std::vector<std::string> found;
+    this->field(key, found);
+    for (const std::string& name : found) {
+      field.push_back(place_of(key, name, names, std::size_t{0}));
+    }
+  }
+  template <class Row, class Describe>
+  void object(const char* key, Row& row, const Describe& describe) {
+    if (!json_.is_object() || !json_.contains(key)) return fail(name(key) + " is missing");
+    object_if_any(key, row, describe);
+  }
+  template <class Row, class Describe>
+  void object_if_any(const char* key, Row& row, const Describe& describe) {
+    if (!json_.is_object() || !json_.contains(key)) return;
+    Fields fields(json_[key], name(key), error_);
+    if (error_.empty()) describe(fields, row);
   }
 
   // Calls each(item, path) for the list under `key`, when there is one.
@@ -111,18 +164,48 @@ class Fields {
   void convert(const char* key, const Json& json, std::optional<double>& field) {
     convert(key, json, field.emplace());
   }
-  void convert(const char* key, const Json& json, std::uint64_t& field) {
-    if (!json.is_number_unsigned()) return complain(key, json, "a count");
-    field = json.get<std::uint64_t>();
+  template <std::integral Count>
+  void convert(const char* key, const Json& json, Count& field) {
+    if constexpr (std::same_as<Count, bool>) {
+      if (!json.is_boolean()) return complain(key, json, "true or false");
+    } else if (std::unsigned_integral<Count> ? !json.is_number_unsigned()
+                                             : !json.is_number_integer()) {
+      return complain(key, json, "a count");
+    }
+    field = json.get<Count>();
   }
   void convert(const char* key, const Json& json, std::string& field) {
     if (!json.is_string()) return complain(key, json, "a text");
     field = json.get<std::string>();
   }
-  void convert(const char* key, const Json& json, std::vector<std::string>& field) {
-    if (!json.is_array()) return complain(key, json, "a list of texts");
+  template <class T>
+  void convert(const char* key, const Json& json, std::vector<T>& field) {
+    if (!json.is_array()) return complain(key, json, "a list");
     field.clear();
     for (const Json& item : json) convert(key, item, field.emplace_back());
+  }
+  void convert(const char* key, const Json& json, PathSample& sample) {
+    std::vector<double> values;
+    convert(key, json, values);
+    if (values.size() != 4) return complain(key, json, "[t s, x m, y m, heading rad]");
+    sample = {values[0], {values[1], values[2], values[3]}};
+  }
+  void convert(const char* key, const Json& json, Eigen::MatrixXd& field) {
+    std::vector<std::vector<double>> rows;
+    convert(key, json, rows);
+    if (!rows.empty()) field.resize(rows.size(), rows.front().size());
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      if (rows[k].size() != rows.front().size()) return complain(key, json, "rows of one length");
+      field.row(k) = Eigen::Map<const Eigen::RowVectorXd>(rows[k].data(), field.cols());
+    }
+  }
+  template <class Place>
+  Place place_of(const char* key, const std::string& found, const std::vector<std::string>& names,
+                 Place otherwise) {
+    const auto at = std::find(names.begin(), names.end(), found);
+    if (at != names.end()) return static_cast<Place>(at - names.begin());
+    complain(key, found, "one of its names");
+    return otherwise;
   }
   void fail(const std::string& sentence) {
     if (error_.empty()) error_ = "diagnosis.json: " + sentence;

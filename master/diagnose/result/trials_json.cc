@@ -87,28 +87,6 @@ bool read_cell(const Json& json, Field& field) {
   return true;
 }
 
-Json path_json(const std::vector<PathSample>& path) {
-  Json list = Json::array();
-  for (const PathSample& s : path) list.push_back({s.t_s, s.pose.x, s.pose.y, s.pose.theta});
-  return list;
-}
-
-bool read_path(const Json& json, std::vector<PathSample>* path) {
-  if (!json.is_array()) return false;
-  for (const Json& sample : json) {
-    if (!sample.is_array() || sample.size() != 4) return false;
-    for (const Json& v : sample) {
-      if (!v.is_number()) return false;
-    }
-    path->push_back({sample[0].get<double>(),
-                     {sample[1].get<double>(), sample[2].get<double>(), sample[3].get<double>()}});
-  }
-  return true;
-}
-
-constexpr auto kShown = [](auto& v, auto& row) { FIELDS(key, label, matches); };
-constexpr auto kLabels = [](auto& v, auto& row) { FIELDS(ends, residuals, x, y); };
-
 }  // namespace
 
 Json trials_json(const Diagnosis& diagnosis, int digits) {
@@ -172,54 +150,6 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
     trials.push_back(std::move(trial));
   }
   return trials;
-}
-
-Json drives_json(const std::vector<ShownDrive>& drives) {
-  Json list = Json::array();
-  for (const ShownDrive& drive : drives) {
-    Json json = {{"trial", drive.trial}, {"why", drive.why}};
-    if (!drive.measured.empty()) json["measured"] = path_json(drive.measured);
-    if (!drive.tuned.empty()) json["tuned"] = path_json(drive.tuned);
-    if (!drive.final_.empty()) json["final"] = path_json(drive.final_);
-    list.push_back(std::move(json));
-  }
-  return list;
-}
-
-Status read_drives(const Json& json, std::vector<ShownDrive>* drives) {
-  const Error damaged{
-      "diagnosis.json: drives: expected a list of {trial, why, paths}; was this "
-      "written by gapfarm diagnose?"};
-  if (!json.is_array()) return damaged;
-  for (const Json& item : json) {
-    if (!item.is_object() || !item.contains("trial") || !item["trial"].is_number_unsigned() ||
-        !item.contains("why") || !item["why"].is_string()) {
-      return damaged;
-    }
-    ShownDrive& drive = drives->emplace_back();
-    drive.trial = item["trial"].get<std::size_t>();
-    drive.why = item["why"].get<std::string>();
-    for (const auto& [key, path] : {std::pair{"measured", &drive.measured},
-                                    {"tuned", &drive.tuned},
-                                    {"final", &drive.final_}}) {
-      if (item.contains(key) && !read_path(item[key], path)) return damaged;
-    }
-  }
-  return {};
-}
-
-Json pictures_json(const Diagnosis& diagnosis) {
-  Json json = FieldWriter::written(diagnosis.labels, kLabels);
-  json["shown"] = FieldWriter::list(diagnosis.shown, kShown);
-  return json;
-}
-
-Status read_pictures(const Json& pictures, Diagnosis* diagnosis) {
-  std::string error;
-  Fields fields(pictures, "pictures", error);
-  kLabels(fields, diagnosis->labels);
-  fields.list("shown", diagnosis->shown, kShown);
-  return error.empty() ? Status{} : Error{error};
 }
 
 }  // namespace gapfarm
