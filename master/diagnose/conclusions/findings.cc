@@ -176,6 +176,11 @@ std::vector<std::string> findings(const Diagnosis& diagnosis) {
   return text;
 }
 
+int sector_of(double angle_rad) {
+  const double turn = (angle_rad + std::numbers::pi) / (2 * std::numbers::pi);
+  return static_cast<int>(std::floor(turn * kHeadingSectors)) % kHeadingSectors;
+}
+
 LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Cell> cells,
                        const TrialLog& log) {
   LogVariety v;
@@ -191,8 +196,7 @@ LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Ce
     commands.insert(t.command);
     durations.insert(std::lround(1000 * cells[t.cell].command.duration_s));
     levels.insert(std::lround(1000 * cells[t.cell].level));
-    const double turn = (t.X_WS.theta + std::numbers::pi) / (2 * std::numbers::pi);
-    sectors.insert(static_cast<int>(std::floor(turn * kHeadingSectors)) % kHeadingSectors);
+    sectors.insert(sector_of(t.X_WS.theta));
     x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
     y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
     v.longest_min = std::max(v.longest_min, t.context.session_time_s / 60);

@@ -18,6 +18,7 @@ namespace gapfarm {
 
 // Drives go in so many directions at most, and fewer trials show little.
 inline constexpr int kHeadingSectors = 12;
+int sector_of(double angle_rad);
 inline constexpr std::size_t kFewTrialsToJudge = 60;
 
 // "3.14" to three significant digits, without trailing zeros and exponents where it can be read.

@@ -265,10 +265,6 @@ Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const
                                                const Proposals& catalogue) {
   std::vector<std::string> sentences;
   const Regression explained = explained_by(catalogue, named);
-  const auto is_named = [&](const std::string& name) {
-    return std::any_of(named.chosen.begin(), named.chosen.end(),
-                       [&](const ChosenEffect& c) { return c.candidate.signature.effect == name; });
-  };
   for (const ChosenEffect& effect : named.chosen) {
     const std::string& name = effect.candidate.signature.effect;
     const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
@@ -279,7 +275,7 @@ Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const
     with_it.add(second.signature.columns);
     const std::vector<Leftover> left = leftovers(with_it, named.evidence->blocks);
     const bool all = left.empty() || left.front().log10_p >= of.subject.unknown_log10_p;
-    const bool two = is_named(second_of(name)), room = !two && !second_of(name).empty();
+    const bool two = named.chose(second_of(name)), room = !two && !second_of(name).empty();
     sentences.push_back(std::string(two ? "A third " : "A second ") + name + " (" +
                         place_text(of, second.signature, keys) + ") would explain " +
                         std::to_string(std::lround(second.gain)) + " nats more of what is left" +

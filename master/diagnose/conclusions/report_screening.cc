@@ -100,14 +100,11 @@ std::vector<Screened> complete_rows(const DiagnosisRequest& of, const Screening&
                                     const Judgement& judged) {
   std::vector<Screened> rows;
   if (!judged.base_is_suspicious) rows = screening.rows;
-  const std::vector<ChosenEffect>& chosen = judged.named.chosen;
   for (const Effect& effect : of.table().effects()) {
     const std::string& name = effect.name;
     const bool there = contains(rows, name, &Screened::effect);
     // A second one of a kind is looked for where a first was found.
-    const bool named = std::ranges::any_of(
-        chosen, [&](const ChosenEffect& c) { return c.candidate.signature.effect == name; });
-    if (there || (!effect.repeats.empty() && !named)) continue;
+    if (there || (!effect.repeats.empty() && !judged.named.chose(name))) continue;
     Screened& row = rows.emplace_back();
     row.effect = name;
     row.note = "not looked for: no effect is to be named";
@@ -130,10 +127,7 @@ std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Scree
   std::vector<Screened> rows = complete_rows(of, screening, judged);
   for (Screened& row : rows) {
     const auto sizes = screening.detectable.find(row.effect);
-    const bool named = std::any_of(
-        judged.named.chosen.begin(), judged.named.chosen.end(),
-        [&](const ChosenEffect& c) { return c.candidate.signature.effect == row.effect; });
-    if (sizes != screening.detectable.end() && !named) row.detectable_from = sizes->second;
+    if (sizes != screening.detectable.end() && !judged.named.chose(row.effect)) row.detectable_from = sizes->second;
   }
   return rows;
 }

@@ -109,14 +109,6 @@ class BlockBuilder {
   const Study& study_;
 };
 
-std::vector<Values> by_command(const Study& study) {
-  std::size_t most = 0;
-  for (const ResidualTrial& t : study.trials) most = std::max(most, t.command);
-  std::vector<Values> commands(most + 1, Values(study.size(), 0));
-  for (std::size_t i = 0; i < study.size(); ++i) commands[study.trials[i].command][i] = 1;
-  return commands;
-}
-
 // Of what was driven before.
 std::vector<CovariateBlock> blocks_before(const Study& study, const BlockBuilder& b,
                                           const std::vector<Values>& commands) {
@@ -155,9 +147,7 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
         scaled([=](const ResidualTrial& t) { return std::cos(h * t.X_WS.theta); }),
         scaled([=](const ResidualTrial& t) { return std::sin(h * t.X_WS.theta); })};
   };
-  // Trials that may be pushed about alike.
-  const std::vector<Values> commands =
-      study.free_commands ? drive_classes(study) : by_command(study);
+  const std::vector<Values> commands = drive_classes(study);
   double longest_s = 1, mx = 0, my = 0;
   for (const ResidualTrial& t : study.trials) {
     longest_s = std::max(longest_s, t.context.session_time_s);

@@ -22,15 +22,7 @@ Eigen::Vector3d of_gain(const ResidualTrial& trial) { return trial.left + trial.
 
 // Gains that are no session's: a column each.
 Eigen::MatrixXd common_gains(const Study& study) {
-  std::size_t commands = 0;
-  for (const ResidualTrial& t : study.trials) commands = std::max(commands, t.command + 1);
-  std::vector<std::vector<double>> weights;
-  if (study.free_commands) {
-    weights = drive_classes(study);
-  } else {
-    weights.assign(commands, std::vector<double>(study.size(), 0));
-    for (std::size_t i = 0; i < study.size(); ++i) weights[study.trials[i].command][i] = 1;
-  }
+  std::vector<std::vector<double>> weights = drive_classes(study);
   std::vector<double> path, time;
   for (const ResidualTrial& t : study.trials) {
     path.push_back(study.cells[t.cell].path);

@@ -280,8 +280,16 @@ CovariateBlock free_command_block(const Study& study) {
 }
 
 std::vector<std::vector<double>> drive_classes(const Study& study) {
-  std::vector<std::vector<double>> classes(4, std::vector<double>(study.size(), 0));
+  std::size_t count = 4;
+  for (const ResidualTrial& t : study.trials) {
+    if (!study.free_commands) count = std::max(count, t.command + 1);
+  }
+  std::vector<std::vector<double>> classes(count, std::vector<double>(study.size(), 0));
   for (std::size_t i = 0; i < study.size(); ++i) {
+    if (!study.free_commands) {
+      classes[study.trials[i].command][i] = 1;
+      continue;
+    }
     const Duties d = duties_of(study, i);
     const bool turns = std::abs(d.turn) > std::abs(d.drive);
     const bool positive = (turns ? d.turn : d.drive) > 0;

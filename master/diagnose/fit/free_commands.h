@@ -40,7 +40,8 @@ std::vector<Eigen::VectorXd> smooth_misfits(const Study& study);
 // Smooth dependence on both duties and the duration, symmetric or not.
 CovariateBlock free_command_block(const Study& study);
 
-// 1 for the trials of a class, a class each: mostly ahead, back, turning left, turning right.
+// 1 for the trials of a class that may be pushed about alike, a class each: those of a command, or
+// where hardly one repeats mostly ahead, back, turning left, turning right.
 std::vector<std::vector<double>> drive_classes(const Study& study);
 
 // What no effect may claim: directions in which the base model can be retuned, and small

@@ -2,10 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <set>
 
-#include "common/math/statistics.h"
 #include "common/score/fitness.h"
 #include "master/diagnose/places/where.h"
 #include "master/diagnose/push/push_subject.h"
@@ -86,44 +84,27 @@ std::vector<WhereCovariate> covariates(std::span<const ResidualTrial> trials,
   return all;
 }
 
-struct PushVariety {
-  std::size_t pieces = 0, directions = 0, sides = 0;
-  double width_m = 0;
+struct PushVariety : LogVariety {
+  std::size_t directions = 0, sides = 0;
   double fastest = 0, slowest = INFINITY;  // m/s
   std::size_t missed = 0;
-  double typical_cell = 0;
 };
 
-int sector(double angle_rad) {
-  const double turn = (angle_rad + std::numbers::pi) / (2 * std::numbers::pi);
-  return static_cast<int>(std::floor(turn * kHeadingSectors)) % kHeadingSectors;
-}
-
-PushVariety variety(const Study& study) {
-  PushVariety v;
-  std::set<std::size_t> pieces;
+PushVariety variety(const Study& study, const TrialLog& log) {
+  PushVariety v{log_variety(study.trials, study.cells, log)};
   std::set<int> directions, sides;
-  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
   for (const ResidualTrial& t : study.trials) {
-    pieces.insert(t.command);
-    x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
-    y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
     if (!t.push.touched) {
       ++v.missed;
       continue;
     }
-    directions.insert(sector(t.push.direction_rad));
-    sides.insert(sector(t.push.in_piece_rad));
+    directions.insert(sector_of(t.push.direction_rad));
+    sides.insert(sector_of(t.push.in_piece_rad));
     v.fastest = std::max(v.fastest, t.push.speed_m_s);
     v.slowest = std::min(v.slowest, t.push.speed_m_s);
   }
-  v.pieces = pieces.size();
   v.directions = directions.size();
   v.sides = sides.size();
-  v.width_m = std::max(x1 - x0, y1 - y0);
-  std::vector<double> counts;
-  for (const Cell& cell : study.cells) counts.push_back(double(cell.trials));
-  v.typical_cell = median(counts);
   return v;
 }
 
@@ -148,8 +129,8 @@ std::vector<Where> push_where(const Study& study, std::span<const Eigen::Vector3
   return where(study.trials, along_push, covariances, study.cells, problem, options);
 }
 
-std::vector<std::string> push_cautions(const Study& study, const TrialLog& /*log*/) {
-  const PushVariety v = variety(study);
+std::vector<std::string> push_cautions(const Study& study, const TrialLog& log) {
+  const PushVariety v = variety(study, log);
   std::vector<std::string> text;
   const auto add_caution = [&](const std::string& sentence) { text.push_back(sentence); };
   if (study.size() < kFewTrialsToJudge) {
@@ -195,10 +176,10 @@ std::vector<std::string> push_cautions(const Study& study, const TrialLog& /*log
   return text;
 }
 
-std::vector<std::string> push_lacks(const Study& study, const TrialLog& /*log*/) {
-  const PushVariety v = variety(study);
+std::vector<std::string> push_lacks(const Study& study, const TrialLog& log) {
+  const PushVariety v = variety(study, log);
   std::vector<std::string> lacks;
-  if (v.pieces < 2) lacks.emplace_back("several pieces");
+  if (v.commands < 2) lacks.emplace_back("several pieces");
   if (v.directions < 4) lacks.emplace_back("pushes in several directions");
   if (v.sides < 4) lacks.emplace_back("pushes at several sides");
   if (one_speed(v)) lacks.emplace_back("several speeds");

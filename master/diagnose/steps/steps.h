@@ -76,6 +76,10 @@ struct Explanation {
   std::string odd_drives;    // the same of outlier drives in one place
 
   const Study& study() const { return evidence->study; }
+  bool chose(const std::string& effect) const {
+    return std::ranges::any_of(
+        chosen, [&](const ChosenEffect& c) { return c.candidate.signature.effect == effect; });
+  }
   bool names_session_gains() const { return study().session_spread > 0; }
   const FoundSpread* spread(const std::string& effect) const {
     const auto at = std::ranges::find(spreads, effect, &FoundSpread::effect);
