@@ -42,7 +42,8 @@ Json residual_json(const FoundResidual& residual) {
   json.update(FieldWriter::written(residual, kFound));
   ResidualField terms = residual.correction.field;
   for (ResidualTerm& term : terms) {
-    for (ResidualWeights& w : term.weights) w.command = w.command.empty() ? kAllCommands : w.command;
+    for (ResidualWeights& w : term.weights)
+      w.command = w.command.empty() ? kAllCommands : w.command;
   }
   json["terms"] = FieldWriter::list(terms, kTerm);
   if (residual.correction.outliers) {
