@@ -3,7 +3,7 @@
 # and again, and on one of the nodes workers die at once.  The run is the undisturbed one, and says what happened.
 #   disturbed_test.sh BIN ROOT [SUSPENDED_s PREEMPTED-EVERY_s]
 set -u
-BIN=$1 ROOT=$2 SUSPENDED=${3:-60} EVERY=${4:-20}
+BIN=$1 ROOT=$2 SUSPENDED=${3:-8} EVERY=${4:-3}
 source "$ROOT/tests/launch/common.sh"
 T=$(mktemp -d /tmp/gapfarm-fleet-XXXXXX)
 trap clean_up EXIT
