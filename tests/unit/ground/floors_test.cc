@@ -161,7 +161,7 @@ TEST(Floors, AnEdgeIsFoundWhereItIs) {
 // say.
 TEST(Floors, AnEdgesIntervalsHoldIt) {
   const char* wanted = std::getenv("GAPFARM_EDGES");
-  const int edges = wanted != nullptr ? std::atoi(wanted) : 4;
+  const int edges = wanted != nullptr ? std::atoi(wanted) : 3;
   int held = 0, asked = 0;
   for (int e = 0; e < edges; ++e) {
     const auto seed = static_cast<std::uint64_t>(100 + e);
@@ -202,13 +202,13 @@ TEST(Floors, AnEdgesIntervalsHoldIt) {
   EXPECT_GE(held, std::floor(0.9 * asked - 2.33 * std::sqrt(0.09 * asked)));
 }
 
-// The runs of a floor that go every 30th degree.
+// The runs of a floor that go every 60th degree.
 RunLog logged_on(const std::filesystem::path& data, const std::string& floor, int first) {
   const auto map = parse_map(
       *read_text_file(GAPFARM_SOURCE_DIR "/configs/robots/robotino_map.toml"), "robotino_map.toml");
   EXPECT_TRUE(map.ok()) << map.error().message;
   std::vector<Recording> recordings;
-  for (int k = first; k < 72; k += 6) {
+  for (int k = first; k < 72; k += 12) {
     const std::string name = (k < 10 ? "exp0" : "exp") + std::to_string(k) + ".csv";
     if (!std::filesystem::exists(data / floor / name)) continue;
     auto recording = read_recording((data / floor / name).string());
