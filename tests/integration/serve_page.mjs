@@ -147,7 +147,7 @@ async function withoutEvents(url, resume) {
 // From its first stage to its report.
 async function diagnosed(view) {
   writeFileSync(join(folder, "d.toml"), DIAGNOSED);
-  const made = start("simulate", "d.toml", "--trials", "120", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
+  const made = start("simulate", "d.toml", "--trials", "60", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
   check((await made.ended) === 0, `nothing to diagnose: ${made.said}`);
   const diagnosis = start("diagnose", "d.toml", "--trials", "d.csv", "--out", "d", "--workers", "1");
   // Held up until the page is open and again and again from then on, so that its stages are there to
@@ -156,7 +156,7 @@ async function diagnosed(view) {
   diagnosis.kill("SIGSTOP");
   const page = await open(await served(view("d")), { may });
   const hold = () => { diagnosis.kill("SIGCONT"); setTimeout(() => diagnosis.kill("SIGSTOP"), 500); };
-  const holding = setInterval(hold, 1500);
+  const holding = setInterval(hold, 1000);
   const stage = `document.querySelector("#tiles")?.innerText || ""`;
   await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work", 200_000);
   // What was found is there before the report is, stage by stage.
