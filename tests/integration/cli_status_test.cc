@@ -1,6 +1,5 @@
 // `gapfarm status` on runs that are alive, over and dead.
 #include <gmock/gmock.h>
-#include <poll.h>
 #include <signal.h>
 
 #include <nlohmann/json.hpp>
@@ -46,11 +45,7 @@ class CliStatus : public ::testing::Test {
     return generation;
   }
 
-  Json json() const {
-    const Finished finished = gapfarm_command({"status", run_, "--json"});
-    EXPECT_EQ(finished.exit_code, 0) << finished.err;
-    return Json::parse(finished.out, nullptr, false);
-  }
+  Json json() const { return status_of(run_); }
 
   const TemporaryFolder folder_;
   const std::string run_ = folder_ / "run";
@@ -109,7 +104,7 @@ TEST_F(CliStatus, KnowsACrashFromAStop) {
 TEST_F(CliStatus, WatchesUntilTheRunEnds) {
   auto store = std::make_unique<RunStore>(start());
   RunningProgram watch("gapfarm", {"status", run_, "--json", "--watch"});
-  for (int i = 0; i < 1000 && watch.out().empty(); ++i) ::poll(nullptr, 0, 10);
+  ASSERT_TRUE(wait_until([&] { return !watch.out().empty(); }));
   Progress last;
   last.state = RunState::kStopped;
   last.stop_reason = "signal";
@@ -125,7 +120,7 @@ TEST_F(CliStatus, WatchesUntilTheRunEnds) {
 TEST_F(CliStatus, LeavesOnCtrlC) {
   const RunStore store = start();
   RunningProgram watch("gapfarm", {"status", run_, "--watch"});
-  for (int i = 0; i < 1000 && watch.out().empty(); ++i) ::poll(nullptr, 0, 10);
+  ASSERT_TRUE(wait_until([&] { return !watch.out().empty(); }));
   watch.send(SIGINT);
   EXPECT_EQ(watch.wait().exit_code, 130);
 }

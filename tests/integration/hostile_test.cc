@@ -47,8 +47,7 @@ class Hostile : public testing::Test {
   }
 
   std::string digest(const std::string& run) const {
-    const Finished finished = gapfarm_command({"status", folder_ / run, "--json"});
-    return nlohmann::json::parse(finished.out, nullptr, false).value("digest", "");
+    return status_of(folder_ / run).value("digest", "");
   }
 
   SocketOptions worker_link() const {

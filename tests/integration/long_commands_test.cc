@@ -1,10 +1,8 @@
 // What a user sees of commands that take long: how far they are, that a stop loses nothing, and
 // what there is of a run before its end.
 #include <gmock/gmock.h>
-#include <poll.h>
 #include <signal.h>
 
-#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "master/store/command_record.h"
@@ -20,14 +18,6 @@ using Json = nlohmann::json;
 
 constexpr int kStopped = 85;
 constexpr const char* kDemoLog = GAPFARM_SOURCE_DIR "/configs/demo/trials.csv";
-
-bool wait_until(const std::function<bool()>& condition) {
-  for (int i = 0; i < 6000; ++i) {
-    if (condition()) return true;
-    ::poll(nullptr, 0, 10);
-  }
-  return false;
-}
 
 class LongCommands : public ::testing::Test {
  protected:
@@ -141,9 +131,7 @@ TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
                                               "--trials",  kDemoLog,
                                               "--out",     out,
                                               "--workers", "1"};
-  const auto status = [&] {
-    return Json::parse(gapfarm_command({"status", out, "--json"}).out, nullptr, false);
-  };
+  const auto status = [&] { return status_of(out); };
   {
     RunningProgram diagnose("gapfarm", arguments);
     ASSERT_TRUE(wait_until([&] {
@@ -183,10 +171,8 @@ TEST_F(LongCommands, ARunHasAModelBeforeItsEnd) {
   const std::string run = folder_ / "run";
   RunningProgram master(
       "gapfarm", {"evolve", slow_, "--out", run, "--generations", "10000", "--workers", "1"});
-  const auto status = [&] {
-    return Json::parse(gapfarm_command({"status", run, "--json"}).out, nullptr, false);
-  };
-  ASSERT_TRUE(wait_until([&] { return status().value("generation", 0) >= 2; })) << master.err();
+  ASSERT_TRUE(wait_until([&] { return status_of(run).value("generation", 0) >= 2; }))
+      << master.err();
   const std::string predictions = folder_ / "p.csv";
   const Finished live = gapfarm_command(
       {"predict", run, "--trials", kDemoLog, "--out", predictions, "--workers", "1"});
@@ -217,10 +203,7 @@ TEST_F(LongCommands, AModelIsAsNewAsItsRun) {
   };
   EXPECT_THAT(predict().err, Not(HasSubstr("not finished")));
   RunningProgram master("gapfarm", {"resume", run, "--generations", "100000", "--workers", "1"});
-  ASSERT_TRUE(wait_until([&] {
-    return Json::parse(gapfarm_command({"status", run, "--json"}).out, nullptr, false)
-               .value("generation", 0) >= 3;
-  }));
+  ASSERT_TRUE(wait_until([&] { return status_of(run).value("generation", 0) >= 3; }));
   master.send(SIGINT);
   EXPECT_EQ(master.wait().exit_code, kStopped);
   EXPECT_THAT(predict().err, HasSubstr("not finished; taking its best so far"));
@@ -239,9 +222,7 @@ TEST_F(LongCommands, WorkersAndMastersReportThatTheyWait) {
   RunningProgram master("gapfarm",
                         {"evolve", slow_, "--out", run, "--workers", "0", "--listen", endpoint});
   ASSERT_TRUE(wait_until([&] {
-    return Json::parse(gapfarm_command({"status", run, "--json"}).out, nullptr, false)
-               .value("waiting", "")
-               .find("waiting for workers at " + endpoint) == 0;
+    return status_of(run).value("waiting", "").find("waiting for workers at " + endpoint) == 0;
   })) << master.err();
   EXPECT_THAT(gapfarm_command({"status", run}).out, HasSubstr("running: waiting for"));
 }

@@ -20,9 +20,7 @@ class ProgramRuns : public ::testing::Test {
   std::string screen(const std::string& run) const {
     return gapfarm_command({"status", folder_ / run}).out;
   }
-  nlohmann::json status(const std::string& run) const {
-    return nlohmann::json::parse(gapfarm_command({"status", folder_ / run, "--json"}).out);
-  }
+  nlohmann::json status(const std::string& run) const { return status_of(folder_ / run); }
 
   const TemporaryFolder folder_;
 };

@@ -19,22 +19,6 @@ using ::testing::HasSubstr;
 constexpr int kQuarantined = 3;
 constexpr int kStopped = 85;
 
-std::vector<pid_t> children(pid_t pid) {
-  std::vector<pid_t> found;
-  std::ifstream in("/proc/" + std::to_string(pid) + "/task/" + std::to_string(pid) + "/children");
-  for (pid_t child = 0; in >> child;) found.push_back(child);
-  return found;
-}
-
-// 'Z' once it has ended.
-char state_of(pid_t pid) {
-  std::ifstream in("/proc/" + std::to_string(pid) + "/stat");
-  std::string number, name;
-  char state = '?';
-  in >> number >> name >> state;
-  return state;
-}
-
 // The workers that have been given a job, from a log of level debug.
 std::set<std::string> employed(const std::string& log) {
   std::set<std::string> names;
@@ -50,11 +34,7 @@ std::set<std::string> employed(const std::string& log) {
 
 class Quarantine : public ::testing::Test {
  protected:
-  json status() const {
-    const Finished finished = gapfarm_command({"status", run_, "--json"});
-    const json found = json::parse(finished.out, nullptr, false);
-    return found.is_object() ? found : json::object();
-  }
+  json status() const { return status_of(run_); }
 
   Finished resume() const {
     return gapfarm_command({"resume", run_, "--generations", "2", "--workers", "1"});
@@ -82,7 +62,7 @@ TEST_F(Quarantine, IsReportedAndOutlivesTheMaster) {
   // Whoever has taken up work crashes.  The task goes to the next one, first of all.
   std::size_t ended = 0;
   while (status().value("quarantined", 0) == 0) {
-    ASSERT_NE(state_of(master.pid()), 'Z') << master.err();
+    ASSERT_FALSE(master.ended()) << master.err();
     ::poll(nullptr, 0, 20);
     const std::size_t seen = employed(master.err()).size();
     if (seen == ended) continue;
@@ -90,7 +70,7 @@ TEST_F(Quarantine, IsReportedAndOutlivesTheMaster) {
     for (const pid_t worker : children(master.pid())) ::kill(worker, SIGSEGV);
   }
   while (status().value("generation", 0) == 0) {
-    ASSERT_NE(state_of(master.pid()), 'Z') << master.err();
+    ASSERT_FALSE(master.ended()) << master.err();
     ::poll(nullptr, 0, 20);
   }
   master.send(SIGINT);
@@ -132,7 +112,7 @@ TEST_F(Quarantine, AnAlarmNamesBothSides) {
       "gapfarm", {"evolve", config_, "--out", run_, "--generations", "1000000", "--workers", "2"},
       {"GAPFARM_WORKER=" + workers});
   while (status().value("incidents", json::array()).empty()) {
-    ASSERT_NE(state_of(master.pid()), 'Z') << master.err();
+    ASSERT_FALSE(master.ended()) << master.err();
     ::poll(nullptr, 0, 20);
   }
   master.send(SIGINT);

@@ -32,12 +32,6 @@ class RunFolder : public ::testing::Test {
     return gapfarm_command({"resume", run, "--generations", generations, "--workers", "1"});
   }
 
-  static nlohmann::json status(const std::string& run) {
-    const Finished finished = gapfarm_command({"status", run, "--json"});
-    const auto json = nlohmann::json::parse(finished.out, nullptr, false);
-    return json.is_object() ? json : nlohmann::json::object();
-  }
-
   // Runs a shell script with mounts of its own; $G is gapfarm, $C the config, $R a folder.
   Finished with_mounts(const std::string& script, const std::string& folder) const {
     return run_program("/usr/bin/unshare", {"-m", "sh", "-c", script},
@@ -58,7 +52,7 @@ class RunFolder : public ::testing::Test {
 
 TEST_F(RunFolder, ReadOnlyIsReportedAndCanStillBeLookedAt) {
   ASSERT_EQ(evolve(run_, "2").exit_code, 0);
-  const std::string digest = status(run_)["digest"];
+  const std::string digest = status_of(run_)["digest"];
   const Finished tried = with_mounts(
       "mount --bind \"$R\" \"$R\" && mount -o remount,ro,bind \"$R\" || exit 99\n"
       "\"$G\" resume \"$R\" --generations 3 --workers 1; echo \"resume $?\"\n"
@@ -71,7 +65,7 @@ TEST_F(RunFolder, ReadOnlyIsReportedAndCanStillBeLookedAt) {
   EXPECT_THAT(tried.err, AllOf(HasSubstr(run_ + "/run.lock"), HasSubstr("Read-only"),
                                HasSubstr("make the run folder writable")));
   EXPECT_THAT(tried.err, AllOf(HasSubstr(run_ + "/new"), HasSubstr("choose another --out")));
-  EXPECT_EQ(status(run_)["digest"], digest);
+  EXPECT_EQ(status_of(run_)["digest"], digest);
   EXPECT_EQ(resume(run_, "3").exit_code, 0);
 }
 
@@ -82,7 +76,7 @@ TEST_F(RunFolder, WhereOneEndedAnotherBegins) {
                             "--generations", "1", "--seed", "7", "--workers", "1"});
   };
   EXPECT_EQ(begun(config_, run_).exit_code, 0);
-  EXPECT_GE(status(folder_ / "next")["best_fitness"], status(run_)["best_fitness"]);
+  EXPECT_GE(status_of(folder_ / "next")["best_fitness"], status_of(run_)["best_fitness"]);
 
   std::string text = demo_config(6);
   text.replace(text.find("full_speed = [0.1"), 17, "full_speed = [0.5");
@@ -93,7 +87,7 @@ TEST_F(RunFolder, WhereOneEndedAnotherBegins) {
 
 TEST_F(RunFolder, ABranchGoesOnWithAGeneFixedAndLeavesItsRunAlone) {
   ASSERT_EQ(evolve(run_, "2").exit_code, 0);
-  const std::string digest = status(run_)["digest"], bytes = text_of(file_);
+  const std::string digest = status_of(run_)["digest"], bytes = text_of(file_);
   const auto branch = [&](const std::string& from, const std::vector<std::string>& changes,
                           const std::string& out, const std::string& generations) {
     std::vector<std::string> arguments = {"resume",        from,        "--out",     folder_ / out,
@@ -105,7 +99,7 @@ TEST_F(RunFolder, ABranchGoesOnWithAGeneFixedAndLeavesItsRunAlone) {
   const Finished whole = branch(run_, fixed, "whole", "3");
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   EXPECT_EQ(text_of(file_), bytes);
-  const nlohmann::json found = status(folder_ / "whole");
+  const nlohmann::json found = status_of(folder_ / "whole");
   EXPECT_EQ(found["start"]["generation"], 2);
   EXPECT_EQ(found["start"]["digest"], digest);
   EXPECT_FALSE(found["best"]["values"].contains("friction"));
@@ -114,9 +108,9 @@ TEST_F(RunFolder, ABranchGoesOnWithAGeneFixedAndLeavesItsRunAlone) {
   // In parts it goes the same way, and once the gene is free again it is searched.
   ASSERT_EQ(branch(run_, fixed, "parts", "1").exit_code, 0);
   ASSERT_EQ(resume(folder_ / "parts", "3").exit_code, 0);
-  EXPECT_EQ(status(folder_ / "parts")["digest"], found["digest"]);
+  EXPECT_EQ(status_of(folder_ / "parts")["digest"], found["digest"]);
   ASSERT_EQ(branch(folder_ / "whole", {"--free", "friction"}, "free", "1").exit_code, 0);
-  const nlohmann::json free = status(folder_ / "free");
+  const nlohmann::json free = status_of(folder_ / "free");
   EXPECT_TRUE(free["best"]["values"].contains("friction"));
   EXPECT_GE(free["best_fitness"], found["best_fitness"].get<double>() - 1e-9);
 
@@ -146,8 +140,8 @@ TEST_F(RunFolder, WhatAHistoryHasBeginsARun) {
   ASSERT_EQ(next.exit_code, 0) << next.err;
   EXPECT_THAT(next.err, AllOf(HasSubstr("history.csv: begins at 6 of 1"),
                               HasSubstr("not used: birth_id, generation")));
-  EXPECT_NEAR(status(folder_ / "next")["best_fitness"], status(run_)["best_fitness"], 1e-9);
-  EXPECT_EQ(status(folder_ / "next")["start"]["from"], history);
+  EXPECT_NEAR(status_of(folder_ / "next")["best_fitness"], status_of(run_)["best_fitness"], 1e-9);
+  EXPECT_EQ(status_of(folder_ / "next")["start"]["from"], history);
 
   // As pandas has it; the better row goes first.
   const std::string outside =
@@ -169,7 +163,7 @@ TEST_F(RunFolder, BelowAFileIsNoPlaceForARun) {
 // On a disk of its own that fills up and is then enlarged.
 TEST_F(RunFolder, AFullDiskStopsARunThatGoesOnWhenThereIsRoom) {
   ASSERT_EQ(evolve(folder_ / "whole", "20").exit_code, 0);
-  const std::string whole = status(folder_ / "whole")["digest"];
+  const std::string whole = status_of(folder_ / "whole")["digest"];
   std::filesystem::create_directory(run_);
   const Finished tried = with_mounts(
       "mount -t tmpfs -o size=120k none \"$R\" || exit 99\n"
@@ -200,19 +194,19 @@ TEST_F(RunFolder, OfVersion01IsReadAsItIsAndUpgradedByResume) {
     return *database->integer("PRAGMA user_version", "test");
   };
   ASSERT_EQ(schema(), 1);
-  EXPECT_EQ(status(run_)["generation"], 2);
+  EXPECT_EQ(status_of(run_)["generation"], 2);
   const Finished page = gapfarm_command({"report", run_, "--out", folder_ / "page.html"});
   EXPECT_EQ(page.exit_code, 0) << page.err;
   const Finished dry = gapfarm_command({"resume", run_, "--generations", "4", "--dry-run"});
   EXPECT_EQ(dry.exit_code, 0) << dry.err;
   EXPECT_THAT(dry.out, HasSubstr("after generation 2 to at most 4"));
   EXPECT_EQ(schema(), 1) << "reading changes nothing";
-  const std::string digest = status(run_)["digest"];
+  const std::string digest = status_of(run_)["digest"];
 
   const Finished resumed = resume(run_, "4");
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(schema(), kRunStoreSchema);
-  EXPECT_EQ(status(run_)["generation"], 4);
+  EXPECT_EQ(status_of(run_)["generation"], 4);
   const auto database = Database::open(file_, Database::Mode::kQueryOnly);
   auto kept = database->prepare("SELECT digest FROM generations WHERE generation = 2", "test");
   ASSERT_TRUE(*kept->step());
@@ -260,21 +254,21 @@ TEST_F(RunFolder, ASecondMasterIsRefusedAndTheFirstGoesOn) {
   ASSERT_EQ(evolve(folder_ / "whole", "2").exit_code, 0);
   RunningProgram first(
       "gapfarm", {"evolve", config_, "--out", run_, "--generations", "1000000", "--workers", "1"});
-  while (status(run_).value("generation", 0) < 1) ::poll(nullptr, 0, 10);
+  while (status_of(run_).value("generation", 0) < 1) ::poll(nullptr, 0, 10);
   for (const Finished& second : {resume(run_, "2"), evolve(run_, "2")}) {
     EXPECT_EQ(second.exit_code, kRefused);
     EXPECT_THAT(second.err, AllOf(HasSubstr(run_),
                                   HasSubstr("in use by process " + std::to_string(first.pid()))));
   }
-  const auto seen = status(run_);
+  const auto seen = status_of(run_);
   EXPECT_EQ(seen["state"], "running");
   EXPECT_EQ(seen["epoch"], 1);
-  while (status(run_).value("generation", 0) <= seen["generation"]) ::poll(nullptr, 0, 10);
+  while (status_of(run_).value("generation", 0) <= seen["generation"]) ::poll(nullptr, 0, 10);
   first.send(SIGINT);
   EXPECT_EQ(first.wait().exit_code, 85);
   EXPECT_EQ(gapfarm_command({"resume", run_, "--generation", "2", "--generations", "2"}).exit_code,
             0);
-  EXPECT_EQ(status(run_)["digest"], status(folder_ / "whole")["digest"]);
+  EXPECT_EQ(status_of(run_)["digest"], status_of(folder_ / "whole")["digest"]);
 }
 
 }  // namespace gapfarm::run_folder_test

@@ -1,25 +1,19 @@
 #include "tests/integration/run_program.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
-#include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 namespace gapfarm {
-namespace {
-
-std::filesystem::path fresh_folder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "gapfarm-test-XXXXXX").string();
-  return mkdtemp(pattern.data());
-}
-
-}  // namespace
 
 std::string text_of(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
@@ -30,8 +24,7 @@ std::string text_of(const std::filesystem::path& path) {
 
 RunningProgram::RunningProgram(const std::string& program,
                                const std::vector<std::string>& arguments,
-                               const std::vector<std::string>& environment)
-    : folder_(fresh_folder()) {
+                               const std::vector<std::string>& environment) {
   const std::string path =
       program.front() == '/' ? program : std::string(GAPFARM_BIN_DIR) + "/" + program;
   const std::string out = folder_ / "out", err = folder_ / "err";
@@ -57,7 +50,6 @@ RunningProgram::~RunningProgram() {
     ::kill(pid_, SIGKILL);
     ::waitpid(pid_, nullptr, 0);
   }
-  std::filesystem::remove_all(folder_);
 }
 
 void RunningProgram::send(int signal) const { ::kill(pid_, signal); }
@@ -90,14 +82,30 @@ Finished run_program(const std::string& program, const std::vector<std::string>&
   return RunningProgram(program, arguments, environment).wait();
 }
 
-TemporaryFolder::TemporaryFolder() : path_(fresh_folder()) {}
+nlohmann::json status_of(const std::string& run) {
+  const Finished finished = gapfarm_command({"status", run, "--json"});
+  const auto found = nlohmann::json::parse(finished.out, nullptr, false);
+  return found.is_object() ? found : nlohmann::json::object();
+}
 
-TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
+bool wait_until(const std::function<bool()>& holds) {
+  using Clock = std::chrono::steady_clock;
+  for (const auto deadline = Clock::now() + std::chrono::minutes(1); !holds();) {
+    if (Clock::now() > deadline) return false;
+    ::poll(nullptr, 0, 5);
+  }
+  return true;
+}
 
-std::string TemporaryFolder::write(const std::string& name, const std::string& text) const {
-  std::filesystem::create_directories((path_ / name).parent_path());
-  std::ofstream(path_ / name, std::ios::binary) << text;
-  return (path_ / name).string();
+std::vector<pid_t> children(pid_t pid) {
+  std::vector<pid_t> found;
+  const std::filesystem::path tasks = "/proc/" + std::to_string(pid) + "/task";
+  std::error_code gone;
+  for (const auto& task : std::filesystem::directory_iterator(tasks, gone)) {
+    std::ifstream in(task.path() / "children");
+    for (pid_t child = 0; in >> child;) found.push_back(child);
+  }
+  return found;
 }
 
 }  // namespace gapfarm

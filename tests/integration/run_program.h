@@ -4,8 +4,12 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
+
+#include "tests/temporary_folder.h"
 
 namespace gapfarm {
 
@@ -37,7 +41,7 @@ class RunningProgram {
 
  private:
   pid_t pid_ = -1;
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
 };
 
 Finished run_program(const std::string& program, const std::vector<std::string>& arguments,
@@ -48,24 +52,17 @@ inline Finished gapfarm_command(const std::vector<std::string>& arguments,
   return run_program("gapfarm", arguments, environment);
 }
 
+// `gapfarm status RUN --json`; an empty object where there is none.
+nlohmann::json status_of(const std::string& run);
+
+// Looks every few milliseconds; false: not within a minute, which is far beyond what anything
+// takes.
+bool wait_until(const std::function<bool()>& holds);
+
+// The processes that any thread of `pid` has started and that are running.
+std::vector<pid_t> children(pid_t pid);
+
 // The file's bytes; none where it cannot be read.
 std::string text_of(const std::filesystem::path& path);
-
-// A fresh folder that goes with its owner.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  // Writes a file into it and returns its path.
-  std::string write(const std::string& name, const std::string& text) const;
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace gapfarm

@@ -1,12 +1,10 @@
 // The purity contract with real processes (docs/determinism.md): how many workers there are, in
 // which order they get their jobs, who is killed and when leave no trace in any generation.
 #include <gmock/gmock.h>
-#include <poll.h>
 #include <signal.h>
 
 #include <chrono>
 #include <fstream>
-#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "master/store/run_reader.h"
@@ -23,20 +21,9 @@ using Digests = std::vector<std::string>;
 
 constexpr std::size_t kGenerations = 8;
 constexpr int kStopped = 85;
-// Far beyond what anything here takes; only a hang gets there.
-constexpr std::chrono::seconds kPatience{60};
 
 double seconds_since(Clock::time_point begun) {
   return std::chrono::duration<double>(Clock::now() - begun).count();
-}
-
-bool wait_until(const std::function<bool()>& holds) {
-  const auto deadline = Clock::now() + kPatience;
-  while (!holds()) {
-    if (Clock::now() > deadline) return false;
-    ::poll(nullptr, 0, 2);
-  }
-  return true;
 }
 
 // One digest a committed generation; none while there is no store.
@@ -47,17 +34,6 @@ Digests digests(const std::string& run) {
   const auto generations = reader->generations();
   if (!generations) return found;
   for (const StoredGeneration& generation : *generations) found.push_back(generation.digest);
-  return found;
-}
-
-std::vector<pid_t> children(pid_t pid) {
-  std::vector<pid_t> found;
-  const std::filesystem::path tasks = "/proc/" + std::to_string(pid) + "/task";
-  std::error_code gone;
-  for (const auto& task : std::filesystem::directory_iterator(tasks, gone)) {
-    std::ifstream in(task.path() / "children");
-    for (pid_t child = 0; in >> child;) found.push_back(child);
-  }
   return found;
 }
 
@@ -107,8 +83,7 @@ class RunPurity : public ::testing::Test {
   }
 
   std::string status_digest(const std::string& run) const {
-    const Finished finished = gapfarm_command({"status", folder_ / run, "--json"});
-    return nlohmann::json::parse(finished.out, nullptr, false).value("digest", "");
+    return status_of(folder_ / run).value("digest", "");
   }
 
   const TemporaryFolder folder_;
@@ -272,10 +247,7 @@ TEST_F(RunPurity, HoldsOfAFrontForAnyNumberOfWorkersAndKills) {
   const std::string last = std::to_string(std::min(digests(folder_ / "run").size(), kGenerations));
   EXPECT_THAT(resumed("run", {"--generation", last, "--generations", std::to_string(kGenerations)}),
               ElementsAreArray(one));
-  const auto front = [&](const std::string& run) {
-    const Finished status = gapfarm_command({"status", folder_ / run, "--json"});
-    return nlohmann::json::parse(status.out)["front"];
-  };
+  const auto front = [&](const std::string& run) { return status_of(folder_ / run)["front"]; };
   EXPECT_EQ(front("run"), front("one"));
   EXPECT_EQ(front("one")["objectives"].size(), 2u);
   EXPECT_EQ(front("one")["hypervolume"].size(), kGenerations);

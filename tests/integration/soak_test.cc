@@ -8,7 +8,6 @@
 #include <signal.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <random>
 
@@ -24,15 +23,6 @@ constexpr int kKilled = 128 + SIGKILL;
 std::uint64_t number_from(const char* variable, std::uint64_t otherwise) {
   const char* text = std::getenv(variable);
   return text != nullptr ? std::strtoull(text, nullptr, 10) : otherwise;
-}
-
-std::vector<pid_t> children(pid_t pid) {
-  std::vector<pid_t> found;
-  const std::string path =
-      "/proc/" + std::to_string(pid) + "/task/" + std::to_string(pid) + "/children";
-  std::ifstream in(path);
-  for (pid_t child = 0; in >> child;) found.push_back(child);
-  return found;
 }
 
 // Every value of the generations up to `last` and of their members, but for the time they took.

@@ -57,7 +57,7 @@ class BlindCheck : public ::testing::Test {
 
   Result<BlindReport> run() { return run_blind_check(config_, settings_, hooks_); }
 
-  tests::Folder folder_;
+  TemporaryFolder folder_;
   Config config_ = tests::small_config();
   BlindCheckSettings settings_;
   BlindCheckHooks hooks_;

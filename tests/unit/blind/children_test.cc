@@ -22,7 +22,7 @@ class Children : public ::testing::Test {
     return options;
   }
 
-  tests::Folder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(Children, EveryWayToEndIsAnOutcome) {

@@ -147,7 +147,7 @@ TEST(Judge, AgreesWithTheReferenceScorer) {
       set ? set : std::filesystem::path(GAPFARM_SOURCE_DIR) / "../shared";
   const std::filesystem::path scorer = shared / "tools/score_diagnosis.py";
   if (!std::filesystem::exists(scorer) || std::system("python3 -c '' >/dev/null 2>&1") != 0) return;
-  const tests::Folder folder;
+  const TemporaryFolder folder;
   for (const JudgeRow& row : judge_rows()) {
     ASSERT_TRUE(write_file_atomically(folder / "t.json", format_truth(truth_of(row))).ok());
     ASSERT_TRUE(write_file_atomically(folder / "d.json", reported_text(row)).ok());

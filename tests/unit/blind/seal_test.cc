@@ -68,7 +68,7 @@ TEST(TruthBox, KeyReadsBack) {
 }
 
 TEST(TruthBox, PrivateFilesAreTheOwnersAlone) {
-  const tests::Folder folder;
+  const TemporaryFolder folder;
   ASSERT_TRUE(write_private_file(folder / "key", "secret").ok());
   struct stat status = {};
   ASSERT_EQ(::stat((folder / "key").c_str(), &status), 0);

@@ -38,14 +38,4 @@ Config small_config() {
   return config;
 }
 
-Folder::Folder() {
-  std::string name = (std::filesystem::temp_directory_path() / "gapfarm-blind-XXXXXX").string();
-  path_ = ::mkdtemp(name.data());
-}
-
-Folder::~Folder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
 }  // namespace gapfarm::tests

@@ -1,13 +1,13 @@
 // A farm of one worker in this process: real simulations, no sockets.
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
 
 #include "common/config/settings.h"
 #include "master/farm/farm.h"
+#include "tests/temporary_folder.h"
 #include "worker/evaluate.h"
 
 namespace gapfarm::tests {
@@ -25,18 +25,5 @@ class WorkerFarm : public Farm {
 
 // A small experiment: 2 sessions of 12 trials, two durations, 120 Hz.
 Config small_config();
-
-// A fresh folder that goes with its owner.
-class Folder {
- public:
-  Folder();
-  ~Folder();
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace gapfarm::tests

@@ -28,7 +28,7 @@ TEST(Outputs, KeepsWhatIsThereWithoutForce) {
   Outputs outputs;
   EXPECT_THAT(message_of(outputs.plan(file)),
               HasSubstr("exists already; give another name, or --force"));
-  EXPECT_THAT(message_of(outputs.plan_in(folder.path(""), {"new.csv", "predictions.csv"})),
+  EXPECT_THAT(message_of(outputs.plan_in(folder / "", {"new.csv", "predictions.csv"})),
               HasSubstr("exists already"));
   Outputs replacing = forced();
   ASSERT_EQ(message_of(replacing.plan(file)), "");
@@ -39,15 +39,15 @@ TEST(Outputs, KeepsWhatIsThereWithoutForce) {
 TEST(Outputs, NeverWritesWhatTheCommandReads) {
   TemporaryFolder folder;
   const std::string log = folder.write("log.csv", "measured");
-  std::filesystem::create_symlink(log, folder.path("link.csv"));
-  std::filesystem::create_hard_link(log, folder.path("hard.csv"));
-  std::filesystem::create_directories(folder.path("sub"));
+  std::filesystem::create_symlink(log, folder / "link.csv");
+  std::filesystem::create_hard_link(log, folder / "hard.csv");
+  std::filesystem::create_directories(folder / "sub");
   TrialLog trials;
   trials.files = {log};
   Outputs outputs = forced();
   outputs.reads(trials);
   for (const char* name : {"log.csv", "link.csv", "hard.csv", "sub/../log.csv"}) {
-    EXPECT_THAT(message_of(outputs.plan(folder.path(name))), HasSubstr("is read by this command"))
+    EXPECT_THAT(message_of(outputs.plan(folder / name)), HasSubstr("is read by this command"))
         << name;
   }
 }
@@ -57,30 +57,29 @@ TEST(Outputs, FindsWhatCannotBeWrittenBeforeTheWork) {
   folder.write("file", "");
   Outputs outputs;
   EXPECT_THAT(message_of(outputs.plan("/proc/nowhere/out.csv")), HasSubstr("cannot be written"));
-  EXPECT_THAT(message_of(outputs.plan(folder.path("file/out.csv"))), HasSubstr("is no folder"));
-  EXPECT_THAT(message_of(outputs.plan(folder.path(""))), HasSubstr("is a folder, expected a file"));
-  EXPECT_EQ(message_of(outputs.plan(folder.path("new/folder/out.csv"))), "");
+  EXPECT_THAT(message_of(outputs.plan(folder / "file/out.csv")), HasSubstr("is no folder"));
+  EXPECT_THAT(message_of(outputs.plan(folder / "")), HasSubstr("is a folder, expected a file"));
+  EXPECT_EQ(message_of(outputs.plan(folder / "new/folder/out.csv")), "");
   EXPECT_EQ(message_of(outputs.plan("-")), "");
   EXPECT_EQ(message_of(outputs.plan("/dev/null")), "");
   // Looking leaves nothing.
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path("")), {}), 1);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / ""), {}), 1);
 }
 
 // What appears between looking and writing stays too, and no work is lost.
 TEST(Outputs, GivesEachItsOwnFile) {
   const TemporaryFolder folder;
   Outputs outputs;
-  ASSERT_EQ(message_of(outputs.plan(folder.path("a.toml"))), "");
-  EXPECT_THAT(message_of(outputs.plan(folder.path("./a.toml"))),
-              HasSubstr("is to be written twice"));
-  EXPECT_EQ(message_of(outputs.plan(folder.path("b.toml"))), "");
+  ASSERT_EQ(message_of(outputs.plan(folder / "a.toml")), "");
+  EXPECT_THAT(message_of(outputs.plan(folder / "./a.toml")), HasSubstr("is to be written twice"));
+  EXPECT_EQ(message_of(outputs.plan(folder / "b.toml")), "");
   EXPECT_EQ(message_of(outputs.plan("/dev/null")), "");
   EXPECT_EQ(message_of(outputs.plan("/dev/null")), "");
 }
 
 TEST(Outputs, KeepsWhatAppearsMeanwhile) {
   TemporaryFolder folder;
-  const std::string file = folder.path("out.csv");
+  const std::string file = folder / "out.csv";
   Outputs outputs;
   ASSERT_EQ(message_of(outputs.plan(file)), "");
   folder.write("out.csv", "another's");
@@ -94,13 +93,13 @@ TEST(Outputs, DoesNotMixWhatFoldersAreFor) {
   TemporaryFolder folder;
   folder.write("run/run.sqlite", "");
   folder.write("diagnosis/simulations.sqlite", "");
-  const std::string run = folder.path("run"), diagnosis = folder.path("diagnosis");
+  const std::string run = folder / "run", diagnosis = folder / "diagnosis";
   EXPECT_THAT(message_of(check_folder(run, FolderKind::kDiagnosis)), HasSubstr("holds a run"));
   EXPECT_THAT(message_of(check_folder(diagnosis, FolderKind::kRun)),
               HasSubstr("holds a diagnosis"));
   EXPECT_EQ(message_of(check_folder(run, FolderKind::kRun)), "");
   EXPECT_EQ(message_of(check_folder(diagnosis, FolderKind::kDiagnosis)), "");
-  EXPECT_EQ(message_of(check_folder(folder.path("none"), FolderKind::kRun)), "");
+  EXPECT_EQ(message_of(check_folder(folder / "none", FolderKind::kRun)), "");
   EXPECT_THAT(message_of(forced().plan_in(run, {"model.toml"})), HasSubstr("holds a run"));
 }
 

@@ -10,7 +10,7 @@ using testing::HasSubstr;
 class Stamp : public testing::Test {
  protected:
   std::string compared(bool force = false) const {
-    const auto state = compare_stamp(folder_.path(""), "result.json", stamp_, force);
+    const auto state = compare_stamp(folder_ / "", "result.json", stamp_, force);
     if (!state) return state.error().message;
     return *state == FolderState::kNew ? "new" : *state == FolderState::kSame ? "same" : "replaced";
   }

@@ -5,13 +5,12 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 
 #include "common/config/config.h"
-#include "common/trials/files.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 #include "master/experiments/compare/summary.h"
+#include "tests/temporary_folder.h"
 
 namespace gapfarm::compare_test {
 
@@ -132,20 +131,13 @@ TEST(Summary, CountsWhatTheTargetTook) {
 
 class ComparisonFile : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (std::filesystem::temp_directory_path() / "gapfarm-cmp-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-    ASSERT_TRUE(write_file_atomically((folder_ / "base.toml").string(), kBase).ok());
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
+  ComparisonFile() { folder_.write("base.toml", kBase); }
 
-  Result<Comparison> read(const std::string& text) {
-    const std::string path = (folder_ / "compare.toml").string();
-    EXPECT_TRUE(write_file_atomically(path, text).ok());
-    return read_comparison(path);
+  Result<Comparison> read(const std::string& text) const {
+    return read_comparison(folder_.write("compare.toml", text));
   }
 
-  std::filesystem::path folder_;
+  const TemporaryFolder folder_;
 };
 
 TEST_F(ComparisonFile, MergesVariantsInTheFilesOrder) {

@@ -59,7 +59,7 @@ TEST(Model, KeepsARobotOfTrialsFromRest) {
   const auto config = parse_config(
       "scenario = \"srv1\"\n[robot]\nfile = \"tank.toml\"\n[parameters]\nmass = 20.0\n"
       "[genes]\ncontact_length = \"table\"\n",
-      folder.path("config.toml"));
+      folder / "config.toml");
   ASSERT_TRUE(config.ok()) << config.error().message;
   const Problem& problem = config->problem;
   const std::size_t lag = problem.table().row("motor_lag.tau");
@@ -72,8 +72,8 @@ TEST(Model, KeepsARobotOfTrialsFromRest) {
     ParameterValues values = problem.values;
     values[lag] = tau;
     const Model model = model_of_problem(problem, values);
-    ASSERT_TRUE(write_model(model, folder.path("model.toml")).ok());
-    const auto again = read_model(folder.path("model.toml"));
+    ASSERT_TRUE(write_model(model, folder / "model.toml").ok());
+    const auto again = read_model(folder / "model.toml");
     ASSERT_TRUE(again.ok()) << again.error().message;
     EXPECT_EQ(again->values, values);
     EXPECT_EQ(again->robot_file, kOwnRobot);
@@ -86,8 +86,8 @@ TEST(Model, ReadsBackToTheBit) {
   TemporaryFolder folder;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Model model = random_model(seed);
-    ASSERT_TRUE(write_model(model, folder.path("model.toml")).ok());
-    const auto again = read_model(folder.path("model.toml"));
+    ASSERT_TRUE(write_model(model, folder / "model.toml").ok());
+    const auto again = read_model(folder / "model.toml");
     ASSERT_TRUE(again.ok()) << again.error().message;
     ASSERT_EQ(again->values.size(), model.values.size());
     EXPECT_EQ(std::memcmp(again->values.data(), model.values.data(),
@@ -160,10 +160,10 @@ TEST(Model, IsNotWrittenWhenItWouldNotReadBack) {
   TemporaryFolder folder;
   Model model = *nominal_model("srv1");
   model.values[row_of(Srv1::kMass)] = std::numeric_limits<double>::quiet_NaN();
-  const Status status = write_model(model, folder.path("model.toml"));
+  const Status status = write_model(model, folder / "model.toml");
   ASSERT_FALSE(status.ok());
   EXPECT_THAT(status.error().message, HasSubstr("mass is nan"));
-  EXPECT_FALSE(std::filesystem::exists(folder.path("model.toml")));
+  EXPECT_FALSE(std::filesystem::exists(folder / "model.toml"));
 }
 
 }  // namespace gapfarm::model_test

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "common/net/socket.h"
+#include "tests/temporary_folder.h"
 
 namespace gapfarm::keys_test {
 
@@ -18,12 +19,6 @@ using testing::HasSubstr;
 
 class Keys : public testing::Test {
  protected:
-  Keys() {
-    std::string pattern = (fs::temp_directory_path() / "gapfarm-keys-XXXXXX").string();
-    base_ = mkdtemp(pattern.data());
-  }
-  ~Keys() override { fs::remove_all(base_); }
-
   KeyFolder folder(const std::string& name = "keys") const {
     return KeyFolder::open_or_make(base_ / name).value();
   }
@@ -33,7 +28,8 @@ class Keys : public testing::Test {
     return found.st_mode & 0777;
   }
 
-  fs::path base_;
+  const TemporaryFolder temporary_;
+  const fs::path base_ = temporary_.path();
 };
 
 TEST_F(Keys, WhatIsWrittenIsReadAgainAndPrivate) {

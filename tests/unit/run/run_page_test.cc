@@ -10,6 +10,7 @@
 #include "master/run/stored_run.h"
 #include "master/store/database.h"
 #include "master/store/run_store.h"
+#include "tests/temporary_folder.h"
 #include "tests/unit/run/config_of_run.h"
 
 namespace gapfarm::run_page_test {
@@ -21,12 +22,7 @@ constexpr std::size_t kPopulation = 12;
 
 class RunPage : public testing::Test {
  protected:
-  RunPage() {
-    std::string pattern = (fs::temp_directory_path() / "gapfarm-page-XXXXXX").string();
-    folder_ = ::mkdtemp(pattern.data());
-    fs::copy_file(GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", folder_ / "apart.csv");
-  }
-  ~RunPage() override { fs::remove_all(folder_); }
+  RunPage() { fs::copy_file(GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", folder_ / "apart.csv"); }
 
   fs::path run() const { return folder_ / "run"; }
 
@@ -74,7 +70,8 @@ class RunPage : public testing::Test {
     return report ? *report : RunReport();
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(RunPage, StaysSmallHoweverLongTheRun) {

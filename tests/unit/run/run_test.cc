@@ -121,7 +121,7 @@ class RunTest : public testing::Test {
   }
   Progress progress() const { return RunReader::open(path()).value().progress().value(); }
 
-  tests::Folder folder_;
+  TemporaryFolder folder_;
   Listener listener_;
 };
 

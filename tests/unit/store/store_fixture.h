@@ -2,24 +2,17 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <string>
 
 #include "master/store/run_store.h"
+#include "tests/temporary_folder.h"
 
 namespace gapfarm {
 
 class StoreTest : public ::testing::Test {
  protected:
-  StoreTest() {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "gapfarm-store-XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~StoreTest() override { std::filesystem::remove_all(folder_); }
-
   std::filesystem::path run() const { return folder_ / "run"; }
   std::filesystem::path file() const { return run() / "run.sqlite"; }
 
@@ -76,7 +69,8 @@ class StoreTest : public ::testing::Test {
                     .ok());
   }
 
-  std::filesystem::path folder_;
+  const TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path();
 };
 
 }  // namespace gapfarm

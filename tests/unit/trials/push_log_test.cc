@@ -43,7 +43,7 @@ TEST(PushLog, WritesWhatItReads) {
   const std::string pushes = folder.write("pushes.csv", kTwoPushes);
   folder.write("tips.csv", kTwoTips);
   const auto log = read_trial_files({{pushes}}, kPieces);
-  const std::string copy = folder.path("copy/pushes.csv");
+  const std::string copy = folder / "copy/pushes.csv";
   ASSERT_TRUE(write_trials(*log, copy).ok());
   const auto again = read_trial_files({{copy}}, kPieces);
   ASSERT_TRUE(again.ok()) << again.error().message;

@@ -306,7 +306,7 @@ TEST(ReadFiles, NamesTheMistakesOfAllFiles) {
   TemporaryFolder folder;
   const std::vector<std::string> files = {
       folder.write("a.csv", kHeader + "\ns1,0,,forward,,,,0,0,0,nan,0,0\n" + kRow + "\n"),
-      folder.path("none.csv"),
+      folder / "none.csv",
       folder.write("b.csv", kHeader + "\ns2,0,,forward,,,,0,0,0,0,inf,0\n" + kRow + "\n")};
   const auto log = read_trial_files(files, kCommands);
   ASSERT_FALSE(log.ok());
@@ -333,7 +333,7 @@ TEST(ReadFiles, ReadsPathsThatReportWhoseTheyAreOrAreNamed) {
   EXPECT_FALSE(read("# log: log.csv 0123456789abcdef0123456789abcdef\n").has_paths());
   const TrialLog marked = read("# recorded by hand\n# log: log.csv\n");
   EXPECT_TRUE(marked.has_paths());
-  EXPECT_THAT(marked.files, ElementsAre(files[0], folder.path("paths.csv")));
+  EXPECT_THAT(marked.files, ElementsAre(files[0], folder / "paths.csv"));
   ReadOptions options;
   options.paths = {folder.write("elsewhere/way.csv", rows)};
   const TrialLog named = read("", options);
@@ -371,8 +371,8 @@ TEST(ReadFiles, RefusesWhatCannotBeOneLog) {
   EXPECT_THAT(error({a, a}), HasSubstr("name a file once"));
   EXPECT_THAT(error({paths}), HasSubstr("name the trials.csv beside it"));
   EXPECT_THAT(error({}), HasSubstr("no trial files"));
-  EXPECT_THAT(error({folder.path("none.csv")}), HasSubstr("no such file"));
-  EXPECT_THAT(error({folder.path("c")}), HasSubstr("is a folder, expected a file"));
+  EXPECT_THAT(error({folder / "none.csv"}), HasSubstr("no such file"));
+  EXPECT_THAT(error({folder / "c"}), HasSubstr("is a folder, expected a file"));
 }
 
 }  // namespace gapfarm::read_test

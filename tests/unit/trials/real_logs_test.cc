@@ -27,8 +27,8 @@ std::vector<DrivenCommand> commands_of(const TrialLog& log) {
 
 void expect_round_trip(const TrialLog& log) {
   TemporaryFolder folder;
-  ASSERT_TRUE(write_trials(log, folder.path("trials.csv")).ok());
-  const auto again = read_trials(folder.path("trials.csv"), kCommands);
+  ASSERT_TRUE(write_trials(log, folder / "trials.csv").ok());
+  const auto again = read_trials(folder / "trials.csv", kCommands);
   ASSERT_TRUE(again.ok()) << again.error().message;
   EXPECT_EQ(format_trials(log), format_trials(*again));
 }

@@ -71,7 +71,7 @@ void expect_same(const TrialLog& a, const TrialLog& b) {
 TEST(WriteTrials, ReadsBackToTheBit) {
   TemporaryFolder folder;
   const TrialLog log = awkward_log();
-  const std::string path = folder.path("new/folder/trials.csv");
+  const std::string path = folder / "new/folder/trials.csv";
   const Status status = write_trials(log, path);
   ASSERT_TRUE(status.ok()) << status.error().message;
   const auto again = read_trials(path, kCommands);
@@ -83,10 +83,10 @@ TEST(WriteTrials, ReadsBackToTheBit) {
 
 TEST(WriteTrials, LeavesNoTemporaryFileBehind) {
   TemporaryFolder folder;
-  ASSERT_TRUE(write_trials(awkward_log(), folder.path("trials.csv")).ok());
-  ASSERT_TRUE(write_trials(awkward_log(), folder.path("trials.csv")).ok());
+  ASSERT_TRUE(write_trials(awkward_log(), folder / "trials.csv").ok());
+  ASSERT_TRUE(write_trials(awkward_log(), folder / "trials.csv").ok());
   std::size_t files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder.path(""))) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "")) {
     files += entry.is_regular_file() ? 1 : 0;
   }
   EXPECT_EQ(files, 2u);  // trials.csv and paths.csv
@@ -95,8 +95,8 @@ TEST(WriteTrials, LeavesNoTemporaryFileBehind) {
 TEST(WriteTrials, RefusesWhatWouldNotReadBack) {
   TemporaryFolder folder;
   const auto error = [&](const TrialLog& log) {
-    const Status status = write_trials(log, folder.path("trials.csv"));
-    EXPECT_FALSE(std::filesystem::exists(folder.path("trials.csv")));
+    const Status status = write_trials(log, folder / "trials.csv");
+    EXPECT_FALSE(std::filesystem::exists(folder / "trials.csv"));
     return status.ok() ? "no error" : status.error().message;
   };
   TrialLog log = awkward_log();
@@ -118,16 +118,16 @@ TEST(WriteTrials, RefusesWhatWouldNotReadBack) {
 TEST(WriteTrials, PathsBelongToTheLogThatTheyWereWrittenWith) {
   TemporaryFolder folder;
   TrialLog log = awkward_log();
-  ASSERT_TRUE(write_trials(log, folder.path("trials.csv")).ok());
-  std::filesystem::rename(folder.path("trials.csv"), folder.path("renamed.csv"));
-  const auto renamed = read_trials(folder.path("renamed.csv"), kCommands);
+  ASSERT_TRUE(write_trials(log, folder / "trials.csv").ok());
+  std::filesystem::rename(folder / "trials.csv", folder / "renamed.csv");
+  const auto renamed = read_trials(folder / "renamed.csv", kCommands);
   ASSERT_TRUE(renamed.ok()) << renamed.error().message;
   EXPECT_TRUE(renamed->has_paths());
 
   log.trials[0].path.clear();
   log.trials[0].X_WE.x += 1;
-  ASSERT_TRUE(write_trials(log, folder.path("trials.csv")).ok());
-  const auto again = read_trials(folder.path("trials.csv"), kCommands);
+  ASSERT_TRUE(write_trials(log, folder / "trials.csv").ok());
+  const auto again = read_trials(folder / "trials.csv", kCommands);
   ASSERT_TRUE(again.ok()) << again.error().message;
   EXPECT_FALSE(again->has_paths());
   EXPECT_THAT(again->notes, testing::ElementsAre(HasSubstr("trials.csv has changed since")));
