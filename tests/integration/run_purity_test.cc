@@ -186,9 +186,10 @@ INSTANTIATE_TEST_SUITE_P(Kinds, AsynchronousPurity,
 
 TEST_P(AsynchronousPurity, HoldsForAnyNumberOfWorkersWhileTheyAreKilled) {
   std::ofstream(config_) << demo_config(
-      40, 3, kMoreGenes,
-      "asynchronous = true\n[evolution.stop]\ngenerations = " + std::to_string(kGenerations) +
-          "\n[optimiser]\npopulation = 80\nkind = \"" + GetParam() + "\"\n");
+      24, 3, kMoreGenes,
+      "asynchronous = true\nislands = 4\n[evolution.stop]\ngenerations = " +
+          std::to_string(kGenerations) + "\n[optimiser]\npopulation = 24\nkind = \"" + GetParam() +
+          "\"\n");
   const Digests one = evolved("one", {"--workers", "1"});
   ASSERT_THAT(one, SizeIs(kGenerations));
   EXPECT_THAT(evolved("two", {"--workers", "2", "--shuffle", "5"}), ElementsAreArray(one));
