@@ -1,4 +1,4 @@
-// A night's trouble in half a minute: workers and masters are killed with -9 at random, while a
+// A night's trouble in a few seconds: workers and masters are killed with -9 at random, while a
 // proxy drops, doubles, delays and reorders a tenth of all messages; what the run store holds in
 // the end is what an undisturbed run would have left.  The longer version:
 //   GAPFARM_SOAK_WORKERS=2000 GAPFARM_SOAK_MASTERS=200 test_soak
@@ -136,7 +136,7 @@ TEST_F(Soak, LeavesTheBytesOfAnUndisturbedRun) {
   RunningProgram proxy("gapfarm-fault-proxy", {"--listen", worker_end_, "--connect", master_end_,
                                                "--seed", std::to_string(seed_), "--share", "0.1"});
   start_supervisors(2);
-  disturb(number_from("GAPFARM_SOAK_WORKERS", 100), number_from("GAPFARM_SOAK_MASTERS", 10));
+  disturb(number_from("GAPFARM_SOAK_WORKERS", 50), number_from("GAPFARM_SOAK_MASTERS", 5));
   if (HasFatalFailure()) return;
 
   // The last master is left in peace, but for the proxy, and comes to an end.
