@@ -376,10 +376,13 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   stage(kRestStage);
   measure_rest(fitter, work, &search);
   search.unexplained = share_unexplained(fitter, search.best);
-  if (search.unexplained >= kUnexplained && !(search.faults.empty() && search.steps.empty())) {
+  if (search.unexplained >= kUnexplained && !question.catalogue.empty()) {
     // What fits a little better then is a name for nothing.
     GroundQuestion as_it_is = question;
     as_it_is.catalogue.clear();
+    as_it_is.faults.clear();
+    as_it_is.fault_gains.clear();
+    as_it_is.sensor.clear();
     return search_ground(robot, log, settings, as_it_is, work);
   }
   if (work.stopped && work.stopped()) return stopped;

@@ -107,6 +107,20 @@ TEST(RelativePoses, DiagnoseARobotWhoseSensorLooksAnyWay) {
   }
 }
 
+// It once looked for what the log shows without end.
+TEST(RelativePoses, NameNothingWhereCommandsExplainNothing) {
+  RunLog log = driven(2, 31, {0.1, 0.02, 1.6});
+  for (LoggedRun& run : log.runs) {
+    for (std::size_t k = 0; k < run.commands.size() / 2; ++k) {
+      std::swap(run.commands[k].values, run.commands[run.commands.size() - 1 - k].values);
+    }
+  }
+  const auto found = diagnose_ground(robot_by_its_maker(), log, {});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->diagnosis.verdict, Verdict::kUnknown) << found->diagnosis.headline;
+  EXPECT_TRUE(found->diagnosis.effects.empty()) << found->diagnosis.headline;
+}
+
 // Upside down it sees what a robot would do whose sides are swapped.
 TEST(RelativePoses, ReportThatTheSensorMayBeUpsideDown) {
   RunLog log = driven(2, 31, {0.1, 0.02, 1.6});
