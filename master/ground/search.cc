@@ -64,7 +64,9 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
     if (promised < kLeastPromise) return {index, std::max(promised, 0.0), {}};
   }
   *fit = fitter.fit(rows, {}, values);
-  Offer offer{index, fit->objective - search.fit.objective - hypothesis.price, {}};
+  const double gain = hypothesis.name == kFloorEdge ? gain_of_edge(fitter, *fit, search.fit)
+                                                    : fit->objective - search.fit.objective;
+  Offer offer{index, gain - hypothesis.price, {}};
   offer.values.resize(hypothesis.freed.size());
   for (std::size_t k = 0; k < hypothesis.freed.size(); ++k) {
     offer.values[k] = fit->values[row_index(rows, hypothesis.freed[k].name)];
@@ -72,7 +74,6 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
       offer.gain = 0;
     }
   }
-  if (hypothesis.name == kFloorEdge && !parts_windows(fitter, *fit)) offer.gain = 0;
   return offer;
 }
 

@@ -57,6 +57,17 @@ std::vector<double> places_along(const WindowFitter& fitter, double angle) {
   return places;
 }
 
+// Whether enough of the windows lie on either side of a fit's line.
+bool parts_windows(const WindowFitter& fitter, const WindowFit& fit) {
+  const EdgeRows at = edge_rows(fit.rows);
+  if (at.angle < 0 || !(fit.values[at.ratio] > 0)) return false;
+  const std::vector<double> places = places_along(fitter, fit.values[at.angle]);
+  const auto beyond = std::lower_bound(places.begin(), places.end(), fit.values[at.offset]);
+  const double share =
+      static_cast<double>(beyond - places.begin()) / static_cast<double>(places.size());
+  return std::min(share, 1 - share) > kLeastSide;
+}
+
 // 90 % of some draws; no less wide than a deviation with the folds' degrees of freedom.
 Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
                           double deviation, const char* unit) {
@@ -135,14 +146,10 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
   return best;
 }
 
-bool parts_windows(const WindowFitter& fitter, const WindowFit& fit) {
-  const EdgeRows at = edge_rows(fit.rows);
-  if (at.angle < 0 || !(fit.values[at.ratio] > 0)) return false;
-  const std::vector<double> places = places_along(fitter, fit.values[at.angle]);
-  const auto beyond = std::lower_bound(places.begin(), places.end(), fit.values[at.offset]);
-  const double share =
-      static_cast<double>(beyond - places.begin()) / static_cast<double>(places.size());
-  return std::min(share, 1 - share) > kLeastSide;
+double gain_of_edge(const WindowFitter& fitter, const WindowFit& with, const WindowFit& without) {
+  if (!parts_windows(fitter, with)) return 0;
+  const double within = fitter.within_runs(with).objective - fitter.within_runs(without).objective;
+  return std::min(with.objective - without.objective, within);
 }
 
 void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,

@@ -122,6 +122,10 @@ class WindowFitter {
   // stated.
   double likeliest_least_noise(const WindowFit& fit) const;
 
+  // A fit that every run has a share of its travel of its own beside, which makes its windows fit
+  // best: a battery, what rollers picked up.
+  WindowFit within_runs(WindowFit fit) const;
+
   // A fit's residuals as they are: m, m, rad.
   std::vector<Eigen::Vector3d> raw_residuals(const WindowFit& fit) const;
   // Of poses; gyros and returns are omitted.

@@ -245,4 +245,29 @@ OffsetFit WindowFitter::fit_with_offsets(WindowFit fit) {
   return all;
 }
 
+WindowFit WindowFitter::within_runs(WindowFit fit) const {
+  std::vector<Eigen::Vector3d> travel(fit.residuals.size(), Eigen::Vector3d::Zero());
+  std::vector<Eigen::Vector2d> sums(windows_.runs.size(), Eigen::Vector2d(0, 1e-12));
+  for (std::size_t i = 0; i < travel.size(); ++i) {
+    if (windows_.sense_of(i) != Sense::kPose) continue;
+    const Pose& X_WE = windows_.trials[i].X_WE;
+    travel[i] =
+        local_difference({windows_.trials[i].X_WS.x, windows_.trials[i].X_WS.y, X_WE.theta}, X_WE);
+    if (!shapes_.empty()) travel[i] = shapes_[i] * travel[i];
+    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double w = window_weight(fit.residuals[i][c], s[c]) * travel[i][c];
+      sums[windows_.run_of[i]] += w * Eigen::Vector2d(fit.residuals[i][c], travel[i][c]);
+    }
+  }
+  for (std::size_t i = 0; i < travel.size(); ++i) {
+    const Eigen::Vector2d& sum = sums[windows_.run_of[i]];
+    fit.residuals[i] -= sum[0] / sum[1] * travel[i];
+  }
+  const std::vector<double> use = uses({});
+  rescale(&fit, use);
+  score(&fit, use);
+  return fit;
+}
+
 }  // namespace gapfarm
