@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <optional>
 
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/progress/stage_clock.h"
@@ -29,6 +32,45 @@ Status check_excluded(const Problem& problem, const std::vector<std::string>& ex
   return {};
 }
 
+// What the catalogue makes of a log.
+struct Answer {
+  std::optional<steps::Screening> screening;
+  std::optional<steps::Judgement> judgement;
+  std::optional<steps::Refit> refit;
+};
+
+Status answer(const steps::DiagnosisRequest& of, const steps::Evidence& measured, bool frees_base,
+              const std::function<void(int stage)>& begin, Answer* answer) {
+  begin(2);
+  ASSIGN_OR_RETURN(answer->screening,
+                   guarded([&] { return steps::screen(of, measured, frees_base); }));
+  const steps::Screening& screening = *answer->screening;
+  emit_readings(of, screening.found);
+  emit_choice(of, screening.found, screening.warning.has_value());
+  begin(3);
+  ASSIGN_OR_RETURN(answer->judgement, guarded([&] { return steps::judge(of, screening); }));
+  emit_verdict(of, *answer->judgement);
+  begin(4);
+  ASSIGN_OR_RETURN(answer->refit, guarded([&] {
+                     return steps::refit(of, measured, screening, *answer->judgement);
+                   }));
+  return {};
+}
+
+// What the catalogue explains may have drawn the base to where nobody would look for it, and be no
+// use from there: where nothing could be named all competes once more, the base free.
+Status ask_again(const steps::DiagnosisRequest& of, const steps::Evidence& measured,
+                 Answer* first) {
+  const bool named = first->refit->judged.named.names_anything();
+  if (named || !steps::beyond_search(of, measured.study)) return {};
+  Answer second;
+  const Status asked = answer(
+      of, measured, /*frees_base=*/true, [](int) {}, &second);
+  if (!asked) return asked.error().code == ErrorCode::kSimulation ? Status() : asked;
+  if (second.refit->judged.verdict == Verdict::kEffect) *first = std::move(second);
+  return {};
+}
+
 // The steps in the order of docs/diagnosis.md.
 Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, StageClock* stages) {
   steps::PartialResult known;
@@ -48,28 +90,18 @@ Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, StageClock
   if (!measured) return end_with(measured.error());
   emit_noise(of, measured->study);
 
-  stages->begin(kDiagnosisStages[2].name);
-  const Result<steps::Screening> screening = guarded([&] { return steps::screen(of, *measured); });
-  if (!screening) return end_with(screening.error());
-  known.screening = &*screening;
-  emit_readings(of, screening->found);
-  emit_choice(of, screening->found, screening->warning.has_value());
-
-  stages->begin(kDiagnosisStages[3].name);
-  const Result<steps::Judgement> judgement = guarded([&] { return steps::judge(of, *screening); });
-  if (!judgement) return end_with(judgement.error());
-  known.judged = &*judgement;
-  emit_verdict(of, *judgement);
-
-  stages->begin(kDiagnosisStages[4].name);
-  const Result<steps::Refit> refit =
-      guarded([&] { return steps::refit(of, *measured, *screening, *judgement); });
-  if (!refit) return end_with(refit.error());
-  known.judged = &refit->judged;
+  Answer found;
+  const auto begin = [&](int stage) { stages->begin(kDiagnosisStages[stage].name); };
+  Status answered = answer(of, *measured, /*frees_base=*/false, begin, &found);
+  if (answered) answered = ask_again(of, *measured, &found);
+  if (found.screening) known.screening = &*found.screening;
+  if (found.judgement) known.judged = &*found.judgement;
+  if (!answered) return end_with(answered.error());
+  known.judged = &found.refit->judged;
 
   stages->begin(kDiagnosisStages[5].name);
-  auto result =
-      guarded([&] { return steps::report(of, *known.screening, steps::add_shape(of, *refit)); });
+  auto result = guarded(
+      [&] { return steps::report(of, *known.screening, steps::add_shape(of, *found.refit)); });
   return result ? std::move(result) : end_with(result.error());
 }
 

@@ -136,9 +136,9 @@ Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, 
   judged.named.estimates.reset();
   std::erase(judged.cautions, refit.correction);
   refit.correction.clear();
-  const bool freed = judged.named.frees_base;
+  const bool bounded = judged.named.frees_base && !measured.study.on_bounds.empty();
   if (missing) judged = with_warning(std::move(judged), std::move(*missing));
-  if (freed) judged = with_base_warning(of, measured, std::move(judged));
+  if (bounded) judged = with_base_warning(of, measured, std::move(judged));
   auto nested = nested_fits(of, judged.named, folds);
   if (!nested) return nested.error();
   refit.nested = std::move(*nested);
@@ -224,7 +224,8 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
     refit.judged = dropped(std::move(refit.judged), *idle);
   }
   const auto missing = missing_too_much(refit);
-  if (missing || (named.frees_base && !explains_bounds(refit))) {
+  const bool bounded = named.frees_base && !measured.study.on_bounds.empty();
+  if (missing || (bounded && !explains_bounds(refit))) {
     return naming_none(of, measured, std::move(refit), missing, folds);
   }
   return with_final_fit(of, std::move(refit));

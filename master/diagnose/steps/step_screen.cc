@@ -304,12 +304,21 @@ Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue
   return fit_jointly(of.predictor, study, effects, fit->at, base, nuisances, rounds);
 }
 
-Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured) {
+bool beyond_search(const DiagnosisRequest& of, const Study& tuned) {
+  if (of.subject.base_moves || !tuned.on_bounds.empty()) return false;
+  return std::ranges::any_of(of.options.genes, [&](const Gene& gene) {
+    const auto at = tuned.base.find(gene.row);
+    return at != tuned.base.end() && (at->second < gene.lower || at->second > gene.upper);
+  });
+}
+
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, bool frees_base) {
   Explanation nothing;
   nothing.evidence = std::make_shared<const Evidence>(measured);
-  nothing.frees_base = !measured.study.on_bounds.empty();
+  const bool bounded = !measured.study.on_bounds.empty();
+  nothing.frees_base = bounded || frees_base;
   auto screening = look_for_all(of, nothing);
-  if (!nothing.frees_base) return screening;
+  if (!bounded) return screening;
   // A base on its bounds may be one that cannot be simulated with much of the catalogue.
   const bool fell = !screening && screening.error().code == ErrorCode::kSimulation;
   if (fell ||

@@ -155,8 +155,12 @@ Result<Study> tune(const DiagnosisRequest& of);
 // The noise that no smooth function explains, and the log by it.
 Result<Evidence> measure(const DiagnosisRequest& of, const Study& tuned);
 
-// All that the catalogue offers, and what of it the log calls for.
-Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured);
+// Whether tuning ended within its bounds, but where the config would not have searched.
+bool beyond_search(const DiagnosisRequest& of, const Study& tuned);
+
+// All that the catalogue offers, and what of it the log calls for; `frees_base`, or a base on its
+// bounds: as Explanation::frees_base.
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, bool frees_base);
 
 // Whether that explains enough to be named.
 Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening);
