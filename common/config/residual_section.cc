@@ -1,6 +1,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/config/sections.h"
 #include "common/problem/run_files.h"
@@ -12,9 +13,7 @@ namespace {
 constexpr const char* kAll = "all";
 
 std::vector<std::string> covariate_names() {
-  std::vector<std::string> names;
-  for (const ResidualCovariate& c : residual_covariates()) names.emplace_back(c.name);
-  return names;
+  return mapped(residual_covariates(), &ResidualCovariate::name);
 }
 
 // Rows of equally many finite numbers.

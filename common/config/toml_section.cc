@@ -84,9 +84,7 @@ void TomlSection::wrong_type(std::string_view key, const toml::node& node,
 std::vector<const toml::node*> TomlSection::elements(const toml::node& node) {
   const toml::array* array = node.as_array();
   if (array == nullptr) return {&node};
-  std::vector<const toml::node*> all;
-  for (const toml::node& element : *array) all.push_back(&element);
-  return all;
+  return mapped(*array, [](const toml::node& element) { return &element; });
 }
 
 std::optional<double> TomlSection::number_of(std::string_view key, const toml::node& node,

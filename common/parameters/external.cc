@@ -29,9 +29,7 @@ constexpr EffectNeed kEffectNeeds[] = {
 constexpr const char* kOfTheBuild[] = {"com_offset"};
 
 std::vector<Parameter> noise_rows() {
-  std::vector<Parameter> rows;
-  for (const Srv1 row : kNoiseRows) rows.push_back(srv1_table()[row_of(row)]);
-  return rows;
+  return mapped(kNoiseRows, [](Srv1 row) { return srv1_table()[row_of(row)]; });
 }
 
 constexpr double kReach_m = 0.3;  // of a laboratory's robot: scales the noise that is assumed

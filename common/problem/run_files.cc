@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/recordings/read.h"
 #include "common/recordings/windows.h"
@@ -9,9 +10,7 @@
 namespace gapfarm {
 
 std::vector<std::string> command_names(const std::vector<CommandSpec>& commands) {
-  std::vector<std::string> names;
-  for (const CommandSpec& command : commands) names.push_back(command.name);
-  return names;
+  return mapped(commands, &CommandSpec::name);
 }
 
 Result<RunLog> read_run_folders(std::span<const std::string> folders,

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/math/laws.h"
 
 namespace gapfarm {
@@ -52,9 +53,7 @@ std::vector<double> likely_steps(const std::vector<double>& values) {
   std::sort(common.begin(), common.end());
   for (std::size_t i = 0; i < common.size() && i < kTriedSteps; ++i)
     chosen.insert(common[i].second);
-  std::vector<double> steps;
-  for (long d : chosen) steps.push_back(static_cast<double>(d) * 1e-5);
-  return steps;
+  return mapped(chosen, [](long d) { return static_cast<double>(d) * 1e-5; });
 }
 
 // Least squares over ever wider differences: a printed step of 7.33 mm may be a third of 22 mm, and

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "common/base/ranges.h"
 #include "common/random/stream.h"
 #include "common/score/motion_model.h"
 
@@ -19,9 +20,7 @@ const T& pick(const std::vector<T>& from, Stream& stream) {
 
 std::vector<CommandSpec> driven_commands(const Problem& problem, const SimulateSettings& settings) {
   if (settings.commands.empty()) return problem.commands;
-  std::vector<CommandSpec> chosen;
-  for (const std::string& name : settings.commands) chosen.push_back(problem.command(name));
-  return chosen;
+  return mapped(settings.commands, [&](const std::string& name) { return problem.command(name); });
 }
 
 constexpr double kFingerSpeed_m_s = 0.1;

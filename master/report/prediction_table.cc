@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/problem/problem.h"
 #include "common/score/fitness.h"
 #include "common/trials/text/csv.h"
@@ -20,12 +21,10 @@ Eigen::Matrix3d local_covariance(const v1::Predicted& p) {
 }
 
 std::vector<PredictedTrial> world_predictions(const v1::PredictResult& result) {
-  std::vector<PredictedTrial> predictions;
-  for (const v1::Predicted& p : result.predictions()) {
-    predictions.push_back({from_proto(p.end()),
-                           rotate_covariance(local_covariance(p), p.end().theta()), p.log_score()});
-  }
-  return predictions;
+  return mapped(result.predictions(), [](const v1::Predicted& p) {
+    return PredictedTrial{from_proto(p.end()),
+                          rotate_covariance(local_covariance(p), p.end().theta()), p.log_score()};
+  });
 }
 
 std::string format_predictions(const TrialLog& log, std::span<const PredictedTrial> predictions) {

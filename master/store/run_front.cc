@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/math/fronts.h"
@@ -20,9 +21,7 @@ std::vector<StoredIndividual> complete(std::vector<StoredIndividual> members,
 }
 
 std::vector<Costs> all_costs(const RunFront& front, const std::vector<StoredIndividual>& members) {
-  std::vector<Costs> all;
-  for (const StoredIndividual& member : members) all.push_back(front.costs(member));
-  return all;
+  return mapped(members, [&](const StoredIndividual& member) { return front.costs(member); });
 }
 
 // Costs of the objectives' own senses, and back.

@@ -1,6 +1,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "worker/effects/behaviour.h"
 
 namespace gapfarm {
@@ -8,14 +9,33 @@ namespace gapfarm {
 namespace {
 
 const EffectBehaviour* behaviour_of(const std::string& effect) {
-  for (const EffectBehaviour* behaviour : effect_behaviours()) {
-    if (behaviour->name == effect) return behaviour;
+  for (const auto rows : {drive_effects(), floor_effects(), camera_effects()}) {
+    const auto row = find_by(rows, effect, &EffectBehaviour::name);
+    if (row != nullptr) return row;
   }
   assert(false && "an effect of a catalogue without an implementation");
   return nullptr;
 }
 
+// What `of` makes of each of `outer` with each of `inner`.
+template <class Case, class Of>
+std::vector<Case> combined(const std::vector<Case>& outer, const std::vector<Case>& inner, Of of) {
+  std::vector<Case> all;
+  for (const Case& a : outer) {
+    for (const Case& b : inner) all.push_back(of(a, b));
+  }
+  return all;
+}
+
 }  // namespace
+
+// Gives `call` this hook and the values of each effect that has it, in their order.
+template <class Hook, class Call>
+void ActiveEffects::each(Hook EffectBehaviour::*hook, Call call) const {
+  for (const Active& a : active_) {
+    if (a.behaviour->*hook != nullptr) call(a.behaviour->*hook, a.values);
+  }
+}
 
 ActiveEffects::ActiveEffects(const ParameterTable& table, const ParameterValues& values) {
   const std::span<const Effect> effects = table.effects();
@@ -42,27 +62,19 @@ ActiveEffects::ActiveEffects(const ParameterTable& table, const ParameterValues&
 }
 
 void ActiveEffects::settings(SimSettings& settings) const {
-  for (const Active& a : active_) {
-    if (a.behaviour->settings) a.behaviour->settings(a.values, settings);
-  }
+  each(&EffectBehaviour::settings, [&](auto hook, auto& values) { hook(values, settings); });
 }
 
 void ActiveEffects::push(PushSettings& settings) const {
-  for (const Active& a : active_) {
-    if (a.behaviour->push) a.behaviour->push(a.values, settings);
-  }
+  each(&EffectBehaviour::push, [&](auto hook, auto& values) { hook(values, settings); });
 }
 
 void ActiveEffects::drive(const Situation& situation, DriveState& drive) const {
-  for (const Active& a : active_) {
-    if (a.behaviour->drive) a.behaviour->drive(a.values, situation, drive);
-  }
+  each(&EffectBehaviour::drive, [&](auto hook, auto& values) { hook(values, situation, drive); });
 }
 
 void ActiveEffects::floor(const Situation& situation, Floor& floor) const {
-  for (const Active& a : active_) {
-    if (a.behaviour->floor) a.behaviour->floor(a.values, situation, floor);
-  }
+  each(&EffectBehaviour::floor, [&](auto hook, auto& values) { hook(values, situation, floor); });
 }
 
 Pose ActiveEffects::observe(Pose X_WR) const {
@@ -75,17 +87,14 @@ Pose ActiveEffects::observe(Pose X_WR) const {
 }
 
 Pose ActiveEffects::recover(Pose X_WM) const {
-  for (const Active& a : active_) {
-    if (a.behaviour->recover) X_WM = a.behaviour->recover(a.values, X_WM);
-  }
+  each(&EffectBehaviour::recover, [&](auto hook, auto& values) { X_WM = hook(values, X_WM); });
   return X_WM;
 }
 
 std::vector<double> ActiveEffects::beyond_lines(const Pose& X_WR) const {
   std::vector<double> distances;
-  for (const Active& a : active_) {
-    if (a.behaviour->beyond) distances.push_back(a.behaviour->beyond(a.values, X_WR));
-  }
+  each(&EffectBehaviour::beyond,
+       [&](auto hook, auto& values) { distances.push_back(hook(values, X_WR)); });
   return distances;
 }
 
@@ -99,9 +108,7 @@ ActiveEffects ActiveEffects::seen_from(unsigned sides) const {
 }
 
 Pose ActiveEffects::place(Pose X_WR) const {
-  for (const Active& a : active_) {
-    if (a.behaviour->place) X_WR = a.behaviour->place(a.values, X_WR);
-  }
+  each(&EffectBehaviour::place, [&](auto hook, auto& values) { X_WR = hook(values, X_WR); });
   return X_WR;
 }
 
@@ -114,71 +121,52 @@ Pose ActiveEffects::unplace(Pose X_WR) const {
 
 std::vector<DriveBranch> ActiveEffects::branches() const {
   std::vector<DriveBranch> all = {DriveBranch{}};
-  for (const Active& a : active_) {
-    if (!a.behaviour->branches) continue;
-    std::vector<DriveBranch> combined;
-    for (const DriveBranch& outer : all) {
-      for (const DriveBranch& inner : a.behaviour->branches(a.values)) {
-        combined.push_back({outer.weight * inner.weight, outer.left_gain * inner.left_gain,
-                            outer.right_gain * inner.right_gain});
-      }
-    }
-    all = std::move(combined);
-  }
+  each(&EffectBehaviour::branches, [&](auto hook, auto& values) {
+    all = combined(all, hook(values), [](const DriveBranch& outer, const DriveBranch& inner) {
+      return DriveBranch{outer.weight * inner.weight, outer.left_gain * inner.left_gain,
+                         outer.right_gain * inner.right_gain};
+    });
+  });
   return all;
 }
 
 DriveBranch ActiveEffects::draw(Stream& stream) const {
   DriveBranch drawn;
-  for (const Active& a : active_) {
-    if (!a.behaviour->draw) continue;
-    const DriveBranch branch = a.behaviour->draw(a.values, stream);
+  each(&EffectBehaviour::draw, [&](auto hook, auto& values) {
+    const DriveBranch branch = hook(values, stream);
     drawn.left_gain *= branch.left_gain;
     drawn.right_gain *= branch.right_gain;
-  }
+  });
   return drawn;
 }
 
 std::vector<StartTurn> ActiveEffects::start_turns(bool moved) const {
   std::vector<StartTurn> all = {StartTurn{}};
-  for (const Active& a : active_) {
-    if (!a.behaviour->start_turns) continue;
-    std::vector<StartTurn> combined;
-    for (const StartTurn& outer : all) {
-      for (const StartTurn& inner : a.behaviour->start_turns(a.values, moved)) {
-        combined.push_back({outer.weight * inner.weight, outer.turn_rad + inner.turn_rad});
-      }
-    }
-    all = std::move(combined);
-  }
+  each(&EffectBehaviour::start_turns, [&](auto hook, auto& values) {
+    all = combined(all, hook(values, moved), [](const StartTurn& outer, const StartTurn& inner) {
+      return StartTurn{outer.weight * inner.weight, outer.turn_rad + inner.turn_rad};
+    });
+  });
   return all;
 }
 
 double ActiveEffects::draw_start_turn(bool moved, Stream& stream) const {
   double turn_rad = 0;
-  for (const Active& a : active_) {
-    if (a.behaviour->draw_start_turn) {
-      turn_rad += a.behaviour->draw_start_turn(a.values, moved, stream);
-    }
-  }
+  each(&EffectBehaviour::draw_start_turn,
+       [&](auto hook, auto& values) { turn_rad += hook(values, moved, stream); });
   return turn_rad;
 }
 
 double ActiveEffects::session_spread() const {
   double spread = 0;
-  for (const Active& a : active_) {
-    if (a.behaviour->session_spread) {
-      spread = std::hypot(spread, a.behaviour->session_spread(a.values));
-    }
-  }
+  each(&EffectBehaviour::session_spread,
+       [&](auto hook, auto& values) { spread = std::hypot(spread, hook(values)); });
   return spread;
 }
 
 Reading ActiveEffects::reading() const {
   Reading reading;
-  for (const Active& a : active_) {
-    if (a.behaviour->reading) a.behaviour->reading(a.values, reading);
-  }
+  each(&EffectBehaviour::reading, [&](auto hook, auto& values) { hook(values, reading); });
   return reading;
 }
 

@@ -1,4 +1,4 @@
-// What each effect of the catalogue does.  One file an effect; table.cc lists them.
+// What each effect of the catalogue does: a row of drive.cc, floor.cc or camera.cc.
 //
 // A trial runs through three stages.  Drive effects change what the motors do, floor effects what
 // the floor does to the robot, camera effects what is logged of a pose.  An effect fills only the
@@ -89,8 +89,10 @@ struct EffectBehaviour {
   double (*draw_start_turn)(EffectValues p, bool moved, Stream& stream) = nullptr;
 };
 
-// One row an effect of any catalogue, by name.
-std::span<const EffectBehaviour* const> effect_behaviours();
+// One row an effect of any catalogue, by its name.
+std::span<const EffectBehaviour> drive_effects();
+std::span<const EffectBehaviour> floor_effects();
+std::span<const EffectBehaviour> camera_effects();
 
 // The effects that are not neutral at some parameter values, ready to be applied.
 class ActiveEffects {
@@ -125,6 +127,10 @@ class ActiveEffects {
     const EffectBehaviour* behaviour;
     std::vector<double> values;
   };
+
+  template <class Hook, class Call>
+  void each(Hook EffectBehaviour::*hook, Call call) const;
+
   std::vector<Active> active_;
   unsigned motion_context_ = kNoContext;
 };

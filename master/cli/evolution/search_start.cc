@@ -9,6 +9,7 @@
 #include <limits>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
@@ -26,9 +27,7 @@ const std::string& key_of(const Problem& problem, const Gene& gene) {
 }
 
 std::vector<std::string> gene_keys(const Problem& problem) {
-  std::vector<std::string> keys;
-  for (const Gene& gene : problem.genes) keys.push_back(key_of(problem, gene));
-  return keys;
+  return mapped(problem.genes, [&](const Gene& gene) { return key_of(problem, gene); });
 }
 
 // As many as a first population takes, each once.
@@ -63,9 +62,7 @@ class TableOfGenes {
     if (rows_.empty()) return text_error(path_, rows.front().end, "no rows", "rows of values");
     std::stable_sort(rows_.begin(), rows_.end(),
                      [](const Row& a, const Row& b) { return a.cost < b.cost; });
-    std::vector<Genome> genomes;
-    for (Row& row : rows_) genomes.push_back(std::move(row.genome));
-    return genomes;
+    return mapped(rows_, [](Row& row) { return std::move(row.genome); });
   }
 
  private:

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "master/evolve/individual.h"
 
@@ -150,9 +151,7 @@ void DifferentialEvolution::remember(const std::vector<Rates>& of_use) {
 }
 
 std::vector<Standing> DifferentialEvolution::compared() const {
-  std::vector<Standing> standings;
-  for (const Individual& individual : population_) standings.push_back(individual.standing);
-  return standings;
+  return mapped(population_, &Individual::standing);
 }
 
 std::vector<NamedNumber> DifferentialEvolution::figures() const {

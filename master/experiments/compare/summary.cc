@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
 #include "master/report/figures/line_chart.h"
 #include "master/report/html.h"
@@ -85,9 +86,7 @@ void add_ranks(const std::vector<std::vector<double>>& blocks, ComparisonSummary
   if (count < 2) return;
   to->all = friedman(blocks);
   const auto column = [&](std::size_t v) {
-    std::vector<double> values;
-    for (const std::vector<double>& block : blocks) values.push_back(block[v]);
-    return values;
+    return mapped(blocks, [&](const std::vector<double>& block) { return block[v]; });
   };
   std::vector<double> p;
   for (std::size_t a = 0; a < count; ++a) {
@@ -216,9 +215,8 @@ ComparisonSummary summarise_comparison(std::span<const Variant> variants,
     }
     assert(own.size() == options.seeds);
     const auto costs_after = [&](std::uint64_t evaluations) {
-      std::vector<double> costs;
-      for (const ComparedRun* run : own) costs.push_back(cost_after(*run, evaluations, higher));
-      return costs;
+      return mapped(own,
+                    [&](const ComparedRun* run) { return cost_after(*run, evaluations, higher); });
     };
     VariantSummary of;
     of.name = variants[v].name;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
@@ -166,11 +167,9 @@ std::vector<ProgressStage> stages_of(const std::vector<std::string>& groups,
   const std::uint64_t tasks = most_evaluations(plan.tuning.evolution, genes) +
                               2 * (1 + plan.tests.size()) +
                               2 * plan.sweeps.size() * plan.sweep_points;
-  std::vector<ProgressStage> stages;
-  for (const std::string& group : groups) {
-    stages.push_back({group.empty() ? "fit" : "fit " + plan.by + "=" + group, 1, tasks});
-  }
-  return stages;
+  return mapped(groups, [&](const std::string& group) {
+    return ProgressStage{group.empty() ? "fit" : "fit " + plan.by + "=" + group, 1, tasks};
+  });
 }
 
 v1::Task evaluate_task(const Genome& genome, std::uint64_t seed, std::uint64_t birth_id) {

@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "master/report/figures/line_chart.h"
 #include "master/report/page_frame.h"
@@ -15,9 +16,7 @@ namespace gapfarm {
 namespace {
 
 std::vector<SvgPoint> drawn(std::span<const PathPoint> path) {
-  std::vector<SvgPoint> points;
-  for (const PathPoint& p : path) points.push_back({p.x(), p.y()});
-  return points;
+  return mapped(path, [](const PathPoint& p) { return SvgPoint{p.x(), p.y()}; });
 }
 
 LineChart floor_chart(const DriveReport& report) {

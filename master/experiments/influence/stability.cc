@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
@@ -51,11 +52,9 @@ class Search {
 };
 
 std::vector<Score> scores_of(const std::vector<std::optional<double>>& spreads) {
-  std::vector<Score> scores;
-  for (const auto& spread : spreads) {
-    scores.push_back({spread ? v1::OK : v1::DIVERGED, spread.value_or(0)});
-  }
-  return scores;
+  return mapped(spreads, [](const auto& spread) {
+    return Score{spread ? v1::OK : v1::DIVERGED, spread.value_or(0)};
+  });
 }
 
 }  // namespace
@@ -93,8 +92,7 @@ Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
   report.standard_spread = standard.front();
   for (int idle = 0;
        optimiser->evaluations() < settings.evaluations && idle < kMostIdleGenerations;) {
-    std::vector<Genome> genomes;
-    for (const Candidate& candidate : optimiser->ask()) genomes.push_back(candidate.genome);
+    std::vector<Genome> genomes = mapped(optimiser->ask(), &Candidate::genome);
     ASSIGN_OR_RETURN(const auto spreads, search.spreads(genomes, 0));
     for (std::size_t i = 0; i < genomes.size(); ++i) {
       if (spreads[i]) report.tried.push_back({problem.values_of(genomes[i]), *spreads[i]});

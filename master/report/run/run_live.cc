@@ -38,13 +38,12 @@ std::string list_of(const std::vector<std::string>& lines, const char* css_class
 
 std::string worker_table(const RunFarm& farm) {
   if (farm.workers.empty()) return "<p>No worker has been heard of by this run's last master.</p>";
-  std::vector<HtmlRow> rows;
-  for (const RunWorker& w : farm.workers) {
-    rows.push_back({html_escaped(w.name),
-                    {html_escaped(w.host), html_escaped(w.state), std::to_string(w.jobs),
-                     number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s),
-                     w.failure.empty() ? "–" : html_escaped(w.failure)}});
-  }
+  std::vector<HtmlRow> rows = mapped(farm.workers, [](const RunWorker& w) {
+    return HtmlRow{html_escaped(w.name),
+                   {html_escaped(w.host), html_escaped(w.state), std::to_string(w.jobs),
+                    number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s),
+                    w.failure.empty() ? "–" : html_escaped(w.failure)}};
+  });
   return html_table("cards", "workers", "Workers",
                     {{"worker"},
                      {"host"},

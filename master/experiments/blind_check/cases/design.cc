@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
@@ -56,9 +57,7 @@ struct Sizing {
 };
 
 std::vector<std::string> effect_names(const ParameterTable& table) {
-  std::vector<std::string> names;
-  for (const Effect& effect : table.effects()) names.push_back(effect.name);
-  return names;
+  return mapped(table.effects(), &Effect::name);
 }
 
 // REQUIRES: check_effects() accepts the names.

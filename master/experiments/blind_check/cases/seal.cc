@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "common/base/ranges.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
@@ -137,9 +138,7 @@ Result<std::vector<SealedTruth>> TruthKey::open_box(std::string_view box,
     return closed;
   }
   const Json json = parse_json(plain);
-  std::vector<SealedTruth> truths;
-  for (const Json& t : json) truths.push_back({t["id"], t["salt"], t["truth"]});
-  return truths;
+  return mapped(json, [](const Json& t) { return SealedTruth{t["id"], t["salt"], t["truth"]}; });
 }
 
 Status write_private_file(const std::string& path, std::string_view bytes) {
