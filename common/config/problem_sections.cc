@@ -1,7 +1,11 @@
 // [commands], [fitness] and [spread]: the rest of the problem.
+#include <algorithm>
+#include <filesystem>
 #include <set>
 
 #include "common/config/sections.h"
+#include "common/problem/message_parts.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 
@@ -69,6 +73,162 @@ void read_spread(TomlSection& top, SpreadSettings& spread) {
                   "replicates belong to kind = \"sampled\"; cubature has fixed points");
   }
   section->finish();
+}
+
+namespace {
+
+// Several values in place of one.
+void read_objectives(TomlSection& section, std::vector<SearchedObjective>& objectives) {
+  std::set<std::string> names;
+  for (const char* sense : {"minimise", "maximise"}) {
+    for (const std::string& name : section.strings(sense).value_or(std::vector<std::string>())) {
+      if (name.empty() || !names.insert(name).second) {
+        section.fail(sense, "the value '" + name + "' has no name or is named twice");
+      }
+      objectives.push_back({name, sense == std::string("maximise")});
+    }
+  }
+  if (objectives.empty()) return;
+  if (objectives.size() < kLeastObjectives || objectives.size() > kMostObjectives) {
+    section.fail(section.table().contains("minimise") ? "minimise" : "maximise",
+                 "minimise and maximise together name " + std::to_string(kLeastObjectives) +
+                     " to " + std::to_string(kMostObjectives) +
+                     " values; of one value say direction instead");
+  }
+  if (section.table().contains("direction")) {
+    section.fail("direction", "direction is of one value; minimise and maximise say it of several");
+  }
+}
+
+}  // namespace
+
+void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettings& spread) {
+  static const std::vector<std::string> kDirections = {"minimise", "maximise", "minimize",
+                                                       "maximize"};
+  read_objectives(section, fitness.objectives);
+  const bool greatest = fitness.objectives.empty()
+                            ? section.choice("direction", kDirections).value_or(0) % 2 == 1
+                            : fitness.objectives.front().maximise;
+  fitness.kind = greatest ? FitnessKind::kGreatestValue : FitnessKind::kLeastValue;
+  if (section.boolean("noisy").value_or(false)) spread.kind = SpreadKind::kSampled;
+}
+
+bool read_external_section(TomlSection& top, const std::string& config_path,
+                           const ProgramStarter& start, Problem& problem) {
+  const std::string& scenario = problem.scenario;
+  const bool objective = scenario_form(scenario).objective;
+  const std::string example =
+      std::string("[\"python3\", \"") + (objective ? "objective.py" : "simulator.py") + "\"]";
+  const std::string name = objective ? "objective" : "external";
+  auto section = top.section(name);
+  const auto fail = [&](const std::string& sentence) {
+    top.errors().add(section ? section->table().source().begin : top.table().source().begin,
+                     sentence);
+    return false;
+  };
+  if (!section) {
+    return fail("scenario " + scenario + " needs its program:\n  [" + name +
+                "]\n  program = " + example);
+  }
+  ExternalCommand command;
+  command.argv = section->strings("program").value_or(std::vector<std::string>());
+  section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
+  if (objective) read_objective(*section, problem.fitness, problem.spread);
+  section->finish();
+  if (command.argv.empty() || command.argv[0].empty()) {
+    return fail("[" + name + "] program names no program, expected words such as " + example);
+  }
+  std::error_code ignored;
+  command.folder =
+      std::filesystem::absolute(config_path, ignored).lexically_normal().parent_path().string();
+  const Result<std::string> introduction = start(command);
+  if (!introduction) return fail(introduction.error().message);
+  auto program = make_external_program(std::move(command), *introduction, objective);
+  if (!program) return fail(program.error().message);
+  if (Status s = check_program(**program, problem); !s) return fail(s.error().message);
+  if (objective && (*program)->table.table().size() == 0) {
+    return fail("external program '" + (*program)->command.argv[0] +
+                "' declares no parameters, so there is nothing to search");
+  }
+  problem.external = std::move(*program);
+  return true;
+}
+
+namespace {
+
+// A pose in a log is that of the frame in which the corners are listed, or of the centroid.
+const std::vector<std::string> kOrigins = {"frame", "centroid"};
+
+std::optional<Eigen::Vector2d> read_corner(const toml::node& node) {
+  const toml::array* pair = node.as_array();
+  if (pair == nullptr || pair->size() != 2) return {};
+  const auto x = (*pair)[0].value<double>();
+  const auto y = (*pair)[1].value<double>();
+  if (!x || !y) return {};
+  return Eigen::Vector2d(*x, *y);
+}
+
+void read_corners(TomlSection& section, Piece& piece) {
+  const toml::node* node = section.find("corners");
+  if (node == nullptr) return;  // check_piece() misses them
+  const toml::array* list = node->as_array();
+  for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+    const auto corner = read_corner((*list)[i]);
+    if (!corner) {
+      list = nullptr;
+      break;
+    }
+    piece.corners.push_back(*corner);
+  }
+  if (list == nullptr) section.fail("corners", "corners are pairs in m: [[0, 0], [0.1, 0], ...]");
+}
+
+void read_piece(const toml::table& table, const toml::node& node, TomlErrors& errors,
+                std::vector<Piece>& pieces) {
+  TomlSection section(table, "[[pieces]]", errors);
+  Piece piece;
+  section.read("name", piece.name);
+  read_corners(section, piece);
+  const std::size_t origin = section.choice("origin", kOrigins).value_or(0);
+  section.read("thickness", piece.thickness_m, 1e-4, 0.5, "m");
+  section.read("mass", piece.mass_kg, 1e-4, 100, "kg");
+  section.read("symmetry", piece.symmetry, 1, 16);
+  section.finish();
+  const bool twice = std::any_of(pieces.begin(), pieces.end(),
+                                 [&](const Piece& other) { return other.name == piece.name; });
+  if (twice) errors.add(node, "piece " + quoted_word(piece.name) + " is written twice");
+  if (Status s = check_piece(piece); !s) {
+    if (errors.empty()) errors.add(node, s.error().message);
+    return;
+  }
+  if (origin == 1) {
+    const Eigen::Vector2d middle = centroid(piece);
+    for (Eigen::Vector2d& corner : piece.corners) corner -= middle;
+  }
+  pieces.push_back(std::move(piece));
+}
+
+}  // namespace
+
+void read_pieces(TomlSection& top, const ScenarioForm& form, std::vector<Piece>& pieces,
+                 std::vector<CommandSpec>& commands) {
+  if (!form.pieces) return;
+  const toml::node* node = top.find("pieces");
+  const toml::array* list = node == nullptr ? nullptr : node->as_array();
+  if (list == nullptr || list->empty()) {
+    const std::string missing = std::string("scenario ") + form.name +
+                                " needs sections [[pieces]] with name, corners, thickness and mass";
+    top.errors().add(node == nullptr ? top.table().source().begin : node->source().begin, missing);
+    return;
+  }
+  for (const toml::node& entry : *list) {
+    if (const toml::table* table = entry.as_table()) {
+      read_piece(*table, entry, top.errors(), pieces);
+    } else {
+      top.errors().add(entry, "pieces hold " + toml_type_name(entry) + ", expected [[pieces]]");
+    }
+  }
+  for (const Piece& piece : pieces) commands.push_back({piece.name, 0, 0, 0});
 }
 
 }  // namespace gapfarm

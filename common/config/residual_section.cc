@@ -1,7 +1,6 @@
 #include <cmath>
 #include <optional>
 
-#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/config/sections.h"
 #include "common/problem/run_files.h"
@@ -13,7 +12,9 @@ namespace {
 constexpr const char* kAll = "all";
 
 std::vector<std::string> covariate_names() {
-  return mapped(residual_covariates(), &ResidualCovariate::name);
+  std::vector<std::string> names;
+  for (const ResidualCovariate& c : residual_covariates()) names.emplace_back(c.name);
+  return names;
 }
 
 // Rows of equally many finite numbers.

@@ -1,11 +1,201 @@
 #include "common/external/simulator.h"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
+#include <cmath>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
+#include "common/process/child.h"
 
 namespace gapfarm {
+
+namespace {
+
+constexpr std::size_t kShownBytes = 80;
+
+// The beginning of what was reported, with control bytes as '?'.
+std::string shown_line(std::string text) {
+  const bool cut = text.size() > kShownBytes;
+  text.resize(std::min(text.size(), kShownBytes));
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
+  }
+  return "'" + text + (cut ? "...'" : "'");
+}
+
+std::string shell_quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
+std::string in_seconds(double seconds) { return formatted("%g s", seconds); }
+
+void close_fd(int* fd) {
+  if (*fd >= 0) close(*fd);
+  *fd = -1;
+}
+
+}  // namespace
+
+LineProgram::LineProgram(std::vector<std::string> argv, std::string folder, LineLimits limits,
+                         Clock clock)
+    : argv_(std::move(argv)), folder_(std::move(folder)), limits_(limits), clock_(clock) {}
+
+LineProgram::~LineProgram() { kill(); }
+
+std::string LineProgram::name() const { return joined(argv_, " "); }
+
+std::string LineProgram::by_hand(const std::vector<std::string>& lines) const {
+  std::string text = "cd " + shell_quoted(folder_.empty() ? "." : folder_) + " && printf '%s\\n'";
+  for (const std::string& line : lines) text += " " + shell_quoted(line);
+  text += " |";
+  for (const std::string& word : argv_) text += " " + shell_quoted(word);
+  return text;
+}
+
+void LineProgram::kill() {
+  close_fd(&to_);
+  close_fd(&from_);
+  rest_.clear();
+  if (pid_ <= 0) return;
+  ::kill(pid_, SIGKILL);
+  waitpid(pid_, nullptr, 0);
+  pid_ = 0;
+}
+
+Error LineProgram::failed(const std::string& what) {
+  kill();
+  return Error{"external program '" + name() + "' " + what};
+}
+
+// How it ended, of one that closed its pipe.
+Error LineProgram::ended() {
+  constexpr int kPatience_ms = 1000;  // between closing its pipe and being gone
+  int status = 0;
+  pid_t gone = 0;
+  for (int waited = 0; waited < kPatience_ms; ++waited) {
+    gone = waitpid(pid_, &status, WNOHANG);
+    if (gone != 0) break;
+    poll(nullptr, 0, 1);
+  }
+  if (gone != pid_) return failed("closed its output and goes on; it has to answer on stdout");
+  pid_ = 0;
+  if (WIFSIGNALED(status)) {
+    const int signal = WTERMSIG(status);
+    return failed("crashed with signal " + std::to_string(signal) + " (" + strsignal(signal) + ")");
+  }
+  return failed("ended with status " + std::to_string(WEXITSTATUS(status)) +
+                " instead of answering");
+}
+
+Status LineProgram::start() {
+  if (argv_.empty()) return failed("has no name");
+  // A socket, since writing to one that is closed can be made to raise no signal.
+  int in[2], out[2];
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) {
+    return failed(std::string("got no pipe: ") + strerror(errno));
+  }
+  if (pipe2(out, O_CLOEXEC) != 0) return failed(std::string("got no pipe: ") + strerror(errno));
+  ChildSetup setup;
+  setup.arguments = argv_;
+  setup.folder = folder_;
+  setup.in = in[1];
+  setup.out = out[1];
+  const Result<pid_t> pid = start_child(setup);
+  close(in[1]);
+  close(out[1]);
+  to_ = in[0];
+  from_ = out[0];
+  answered_ = false;
+  if (!pid) return failed("cannot be started in '" + folder_ + "': " + pid.error().message);
+  pid_ = *pid;
+  return {};
+}
+
+bool LineProgram::wait_for(int fd, short events, double until) const {
+  for (;;) {
+    const double left = until - clock_();
+    pollfd one{fd, events, 0};
+    const int ready =
+        poll(&one, 1, left > 0 ? static_cast<int>(std::ceil(std::min(left, 1.0) * 1e3)) : 0);
+    if (ready > 0) return true;
+    if (ready == 0 && left <= 0) return false;
+    if (waiting_) waiting_();
+  }
+}
+
+Status LineProgram::send(const std::string& line, double until) {
+  const std::string text = line + "\n";
+  for (std::size_t at = 0; at < text.size();) {
+    if (!wait_for(to_, POLLOUT, until)) return failed("does not read what it is asked");
+    const ssize_t n = ::send(to_, text.data() + at, text.size() - at, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (n > 0) {
+      at += static_cast<std::size_t>(n);
+    } else if (errno != EAGAIN && errno != EINTR) {
+      return ended();
+    }
+  }
+  return {};
+}
+
+Result<std::string> LineProgram::receive(double until, double limit_s) {
+  for (;;) {
+    const std::size_t end = rest_.find('\n');
+    if (std::min(end, rest_.size()) > limits_.answer_bytes) {
+      return failed("sent more than the " + std::to_string(limits_.answer_bytes) +
+                    " bytes that a line may have: " + shown_line(rest_));
+    }
+    if (end != rest_.npos) {
+      std::string line = rest_.substr(0, end);
+      rest_.erase(0, end + 1);
+      return line;
+    }
+    if (!wait_for(from_, POLLIN, until)) {
+      return failed("did not answer within " + in_seconds(limit_s));
+    }
+    char bytes[65536];
+    const ssize_t n = read(from_, bytes, sizeof bytes);
+    if (n > 0) {
+      rest_.append(bytes, static_cast<std::size_t>(n));
+    } else if (n == 0 || errno != EINTR) {
+      return ended();
+    }
+  }
+}
+
+Result<std::string> LineProgram::ask(const std::string& line) {
+  if (!running()) {
+    RETURN_IF_ERROR(start());
+  }
+  if (rest_.empty() && wait_for(from_, POLLIN, clock_())) {
+    char bytes[kShownBytes];
+    const ssize_t n = read(from_, bytes, sizeof bytes);
+    if (n <= 0) return ended();
+    rest_.assign(bytes, static_cast<std::size_t>(n));
+  }
+  if (!rest_.empty()) {
+    const char* when = answered_ ? "answered twice, or late: " : "spoke before it was asked: ";
+    return failed(when + shown_line(rest_));
+  }
+  const double limit_s = answered_ ? limits_.answer_s : limits_.start_s;
+  const double until = clock_() + limit_s;
+  RETURN_IF_ERROR(send(line, until));
+  Result<std::string> answer = receive(until, limit_s);
+  if (answer) answered_ = true;
+  return answer;
+}
+
 namespace {
 
 // Interpreters and physics engines take their time to load.

@@ -1,15 +1,70 @@
 // A simulator of the user's, asked for one motion at a time.
 #pragma once
 
+#include <sys/types.h>
+
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/base/result.h"
-#include "common/external/line_program.h"
 #include "common/external/protocol.h"
 
 namespace gapfarm {
+
+struct LineLimits {
+  double answer_s = 60;                // to one line
+  double start_s = 60;                 // to the first one: interpreters take their time
+  std::size_t answer_bytes = 1 << 20;  // of one line
+};
+
+// Started with the first ask() and again after one that failed; dies with the thread that started
+// it.  Its stderr is this process's.  One thread at a time.
+class LineProgram {
+ public:
+  using Clock = double (*)();  // seconds; never goes back
+
+  // `words`: program and arguments, found by PATH, started in `folder`.
+  LineProgram(std::vector<std::string> argv, std::string folder, LineLimits limits, Clock clock);
+  ~LineProgram();
+  LineProgram& operator=(LineProgram&&) = delete;
+
+  // The line that answers `line`, both without their end.  Errors name the program and what it did:
+  // it cannot be started, has ended (with what status or signal), does not answer in time, says
+  // more than a line may hold, or sent something before it was asked.  After an error it is dead.
+  Result<std::string> ask(const std::string& line);
+
+  // Called about once a second of waiting for it.
+  void while_waiting(std::function<void()> call) { waiting_ = std::move(call); }
+
+  bool running() const { return pid_ > 0; }
+  std::string name() const;  // its words, as typed
+  // What asks it these lines in a shell.
+  std::string by_hand(const std::vector<std::string>& lines) const;
+  // Ends it with SIGKILL.
+  void kill();
+
+ private:
+  Status start();
+  Status send(const std::string& line, double until);
+  Result<std::string> receive(double until, double limit_s);
+  Error ended();
+  Error failed(const std::string& what);
+  bool wait_for(int fd, short events, double until) const;
+
+  std::vector<std::string> argv_;
+  std::string folder_;
+  LineLimits limits_;
+  Clock clock_;
+  std::function<void()> waiting_;
+  pid_t pid_ = 0;
+  int to_ = -1;
+  int from_ = -1;
+  bool answered_ = false;
+  std::string rest_;  // read beyond the last answer
+};
 
 // Whether this process may start the programs that problems name: they come from whoever is the
 // master.  False until it is reported.

@@ -4,8 +4,10 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "common/base/result.h"
+#include "common/parameters/table.h"
 #include "master/evolve/optimiser.h"
 
 namespace gapfarm {
@@ -37,5 +39,13 @@ Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup);
 // damaged or belongs to another kind or other genes.
 Result<std::unique_ptr<Optimiser>> restore_optimiser(const OptimiserSetup& setup,
                                                      std::string_view state);
+
+struct Carried {
+  std::vector<Genome> population;  // best first; empty: of a method that has none
+  std::vector<double> spread;      // CMA-ES's covariance row by row; empty: another method
+};
+
+// Out of Optimiser::state() of any kind but stages; what cannot be read leaves nothing.
+Carried carried_by(std::string_view state, std::size_t genes);
 
 }  // namespace gapfarm

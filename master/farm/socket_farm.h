@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/net/envelope.h"
 #include "common/net/socket.h"
 #include "common/process/stop.h"
 #include "master/farm/farm.h"
@@ -69,5 +70,9 @@ class SocketFarm : public Farm {
   explicit SocketFarm(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+// Handles what has arrived, lets the scheduler decide and sends what it decided.  True: something
+// happened and more may be waiting; do not sleep yet.
+bool pump(Transport& transport, Scheduler& scheduler, double now);
 
 }  // namespace gapfarm

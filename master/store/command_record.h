@@ -10,7 +10,6 @@
 
 #include "common/base/result.h"
 #include "common/json/json.h"
-#include "common/progress/finding.h"
 #include "common/progress/overall_progress.h"
 #include "master/store/records.h"
 

@@ -3,8 +3,8 @@
 #include <string>
 
 #include "worker/scenarios/program.h"
-#include "worker/scenarios/scenarios.h"
-#include "worker/scenarios/srv1/motion_memo.h"
+#include "worker/scenarios/scenario.h"
+#include "worker/scenarios/srv1/srv1_robot.h"
 #include "worker/scenarios/windows.h"
 
 namespace gapfarm {

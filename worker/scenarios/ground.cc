@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "worker/scenarios/scenarios.h"
+#include "worker/scenarios/scenario.h"
 #include "worker/scenarios/windows.h"
 
 namespace gapfarm {

@@ -1,6 +1,6 @@
 #include "common/random/stream.h"
 #include "worker/scenarios/program.h"
-#include "worker/scenarios/scenarios.h"
+#include "worker/scenarios/scenario.h"
 
 namespace gapfarm {
 namespace {

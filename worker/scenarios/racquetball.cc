@@ -2,7 +2,7 @@
 
 #include "common/random/stream.h"
 #include "worker/scenarios/outcome.h"
-#include "worker/scenarios/scenarios.h"
+#include "worker/scenarios/scenario.h"
 #include "worker/sim/racquetball.h"
 
 namespace gapfarm {

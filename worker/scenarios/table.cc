@@ -1,7 +1,6 @@
 #include <array>
 
 #include "worker/scenarios/scenario.h"
-#include "worker/scenarios/scenarios.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/experiments/blind_check/cases/truth.h"
+#include "master/experiments/blind_check/cases/seal.h"
 
 namespace gapfarm {
 

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <set>
 
-#include "master/evolve/genetic/variation.h"
+#include "master/evolve/genetic/breeder.h"
 #include "master/evolve/individual.h"
 #include "tests/unit/evolve/toy_problems.h"
 

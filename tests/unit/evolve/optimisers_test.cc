@@ -7,7 +7,6 @@
 
 #include "common/config/sections.h"
 #include "common/random/stream.h"
-#include "master/evolve/carried.h"
 #include "master/evolve/evolve.h"
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/search_functions.h"

@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
-#include "common/external/line_program.h"
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"
 

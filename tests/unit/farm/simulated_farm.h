@@ -16,7 +16,7 @@
 
 #include "common/net/envelope.h"
 #include "master/farm/farm.h"
-#include "master/farm/pump.h"
+#include "master/farm/socket_farm.h"
 #include "worker/pump.h"
 
 namespace gapfarm {

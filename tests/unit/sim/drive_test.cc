@@ -1,8 +1,8 @@
-#include "worker/sim/robot/drive.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "worker/sim/robot/simulator.h"
 
 namespace gapfarm::sim_drive_test {
 

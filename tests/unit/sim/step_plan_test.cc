@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "worker/sim/robot/drive.h"
+#include "worker/sim/robot/simulator.h"
 
 namespace gapfarm::step_plan_test {
 

@@ -8,7 +8,6 @@
 #include "common/score/motion_model.h"
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"
-#include "worker/scenarios/srv1/motion_memo.h"
 #include "worker/scenarios/srv1/srv1_robot.h"
 
 namespace gapfarm::prediction_test {

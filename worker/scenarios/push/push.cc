@@ -12,7 +12,7 @@
 #include "gapfarm/v1/task.pb.h"
 #include "worker/effects/behaviour.h"
 #include "worker/scenarios/outcome.h"
-#include "worker/scenarios/scenarios.h"
+#include "worker/scenarios/scenario.h"
 #include "worker/sim/push/push.h"
 #include "worker/sim/step_counter.h"
 

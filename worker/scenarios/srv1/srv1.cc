@@ -7,7 +7,7 @@
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/context.h"
-#include "worker/scenarios/scenarios.h"
+#include "worker/scenarios/scenario.h"
 #include "worker/scenarios/srv1/srv1_motions.h"
 #include "worker/scenarios/srv1/srv1_robot.h"
 #include "worker/scenarios/srv1/views.h"

@@ -8,8 +8,8 @@
 
 #include "common/base/result.h"
 #include "common/config/settings.h"
+#include "master/experiments/blind_check/cases/seal.h"
 #include "master/experiments/blind_check/cases/sizing.h"
-#include "master/experiments/blind_check/cases/truth.h"
 #include "master/farm/farm.h"
 
 namespace gapfarm {
