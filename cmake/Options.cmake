@@ -92,6 +92,28 @@ function(gapfarm_cold name)
   endif()
 endfunction()
 
+# gapfarm_texts(HEADER kName=FILE...): build/FOLDER/HEADER with these files as strings.
+function(gapfarm_texts header)
+  file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  set(text "#pragma once\n\nnamespace gapfarm {\n\n")
+  foreach(entry IN LISTS ARGN)
+    string(REGEX MATCH "^([^=]*)=(.*)$" entry ${entry})
+    set(name ${CMAKE_MATCH_1})
+    set(file ${CMAKE_MATCH_2})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+    file(READ ${file} content)
+    string(APPEND text "inline constexpr char ${name}[] = R\"text(${content})text\";\n\n")
+  endforeach()
+  string(APPEND text "}  // namespace gapfarm\n")
+  set(out ${PROJECT_BINARY_DIR}/${folder}/${header})
+  if(EXISTS ${out})
+    file(READ ${out} there)
+  endif()
+  if(NOT "${text}" STREQUAL "${there}")
+    file(WRITE ${out} "${text}")
+  endif()
+endfunction()
+
 # gapfarm_library(NAME [COLD] [PARTS n] SOURCES a.cc b.cc DEPS x y [SEPARATE c.cc...]
 #                 [PRECOMPILE <header>...]): one library a folder, sources listed by hand; SEPARATE
 # ones define names that others define too; PARTS, where one compilation would be too long.

@@ -6,20 +6,10 @@
 
 #include "common/json/json.h"
 #include "master/report/html.h"
+#include "master/report/page_texts.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr std::string_view kStyle = R"(
-body { margin: 0 auto; max-width: 60rem; padding: 1.5rem; background: #fbfaf7; color: #1c1f23;
-  font: 16px/1.5 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
-h1 { font-size: 1.6rem; line-height: 1.25; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.92rem; }
-th, td { padding: 0.3rem 0.8rem; border-bottom: 1px solid #d9d6cf; text-align: right; }
-th:first-child, td:first-child { text-align: left; }
-figure { margin: 1rem 0; } figure svg { max-width: 100%; height: auto; border-radius: 8px; }
-)";
 
 // The picture within the page needs no XML declaration.
 std::string_view without_declaration(std::string_view svg) {
@@ -59,19 +49,6 @@ std::string head(const PageFrame& frame) {
   return html + "</head>\n";
 }
 
-// Patterns distinguish the parts of the gap without colour.
-constexpr const char* kHatches =
-    R"html(<svg class="hatches" width="0" height="0" aria-hidden="true"><defs>
-<pattern id="hatch-1" width="8" height="8" patternUnits="userSpaceOnUse"><rect class="ground-1" width="8" height="8"/></pattern>
-<pattern id="hatch-2" width="8" height="8" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect class="ground-2" width="8" height="8"/><rect class="ink" width="2.5" height="8"/></pattern>
-<pattern id="hatch-3" width="7" height="7" patternUnits="userSpaceOnUse"><rect class="ground-3" width="7" height="7"/><circle class="ink" cx="3.5" cy="3.5" r="1.6"/></pattern>
-<pattern id="hatch-4" width="8" height="8" patternUnits="userSpaceOnUse"><rect class="ground-4" width="8" height="8"/><rect class="ink" width="8" height="2.2"/></pattern>
-<pattern id="hatch-5" width="8" height="8" patternUnits="userSpaceOnUse"><rect class="ground-5" width="8" height="8"/><path class="ink-line" d="M0 0 8 8M8 0 0 8"/></pattern>
-<pattern id="hatch-unexplained" width="9" height="9" patternUnits="userSpaceOnUse" patternTransform="rotate(-45)"><rect class="ground-unexplained" width="9" height="9"/><rect class="ink" width="4.5" height="9"/></pattern>
-<pattern id="hatch-worse" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect class="ground-worse" width="6" height="6"/><rect class="ink" width="3" height="6"/></pattern>
-<pattern id="hatch-floor" width="6" height="6" patternUnits="userSpaceOnUse"><rect class="ground-floor" width="6" height="6"/></pattern>
-</defs></svg>
-)html";
 
 std::string top(const PageFrame& frame) {
   std::string links;
@@ -133,7 +110,7 @@ std::string PlainPage::finish() const {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta name=\"generator\" content=\"gapfarm\">\n<title>{}</title>\n<style>{}</style>\n"
       "</head>\n<body>\n<h1>{}</h1>\n{}</body>\n</html>\n",
-      csp_hash(kStyle), title, kStyle, title, body_);
+      csp_hash(kPlainStyle), title, kPlainStyle, title, body_);
 }
 
 const char* const kNoScript =

@@ -56,93 +56,85 @@ Error sql_error(const std::string& file, const std::string& operation, int code,
 
 void set_database_patience_ms(int patience_ms) { busy_timeout_ms = patience_ms; }
 
+void SqlClose::operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
+void SqlClose::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
 SqlStatement::SqlStatement(sqlite3_stmt* statement, std::string file, std::string operation)
     : statement_(statement), file_(std::move(file)), operation_(std::move(operation)) {}
 
-SqlStatement::SqlStatement(SqlStatement&& other) noexcept { *this = std::move(other); }
-
-SqlStatement& SqlStatement::operator=(SqlStatement&& other) noexcept {
-  std::swap(statement_, other.statement_);
-  std::swap(file_, other.file_);
-  std::swap(operation_, other.operation_);
-  std::swap(bind_result_, other.bind_result_);
-  return *this;
-}
-
-SqlStatement::~SqlStatement() { sqlite3_finalize(statement_); }
-
 SqlStatement& SqlStatement::bind(int index, std::int64_t value) {
-  bind_result_ |= sqlite3_bind_int64(statement_, index, value);
+  bind_result_ |= sqlite3_bind_int64(statement_.get(), index, value);
   return *this;
 }
 
 SqlStatement& SqlStatement::bind(int index, double value) {
-  bind_result_ |= sqlite3_bind_double(statement_, index, value);
+  bind_result_ |= sqlite3_bind_double(statement_.get(), index, value);
   return *this;
 }
 
 SqlStatement& SqlStatement::bind(int index, std::optional<double> value) {
-  bind_result_ |=
-      value ? sqlite3_bind_double(statement_, index, *value) : sqlite3_bind_null(statement_, index);
+  bind_result_ |= value ? sqlite3_bind_double(statement_.get(), index, *value)
+                        : sqlite3_bind_null(statement_.get(), index);
   return *this;
 }
 
 SqlStatement& SqlStatement::bind(int index, std::string_view value) {
-  bind_result_ |= sqlite3_bind_text64(statement_, index, value.data() ? value.data() : "",
+  bind_result_ |= sqlite3_bind_text64(statement_.get(), index, value.data() ? value.data() : "",
                                       value.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
   return *this;
 }
 
 SqlStatement& SqlStatement::bind_blob(int index, std::string_view value) {
-  bind_result_ |= sqlite3_bind_blob64(statement_, index, value.data() ? value.data() : "",
+  bind_result_ |= sqlite3_bind_blob64(statement_.get(), index, value.data() ? value.data() : "",
                                       value.size(), SQLITE_TRANSIENT);
   return *this;
 }
 
 Result<bool> SqlStatement::step() {
-  sqlite3* handle = sqlite3_db_handle(statement_);
+  sqlite3* handle = sqlite3_db_handle(statement_.get());
   if (bind_result_ != SQLITE_OK) {
     return sql_error(file_, operation_, bind_result_, "a value could not be bound", handle);
   }
-  const int code = sqlite3_step(statement_);
+  const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_ROW) return true;
   if (code == SQLITE_DONE) return false;
   Error error = sql_error(file_, operation_, sqlite3_extended_errcode(handle),
                           sqlite3_errmsg(handle), handle);
-  sqlite3_reset(statement_);
+  sqlite3_reset(statement_.get());
   return error;
 }
 
 Status SqlStatement::run() {
   RETURN_IF_ERROR(step());
-  sqlite3_reset(statement_);
-  sqlite3_clear_bindings(statement_);
+  sqlite3_reset(statement_.get());
+  sqlite3_clear_bindings(statement_.get());
   return {};
 }
 
 std::int64_t SqlStatement::integer(int column) const {
-  return sqlite3_column_int64(statement_, column);
+  return sqlite3_column_int64(statement_.get(), column);
 }
 
 void SqlStatement::read(int column, double& to) const {
-  to = sqlite3_column_double(statement_, column);
+  to = sqlite3_column_double(statement_.get(), column);
 }
 
 void SqlStatement::read(int column, std::optional<double>& to) const {
   to.reset();
-  if (sqlite3_column_type(statement_, column) != SQLITE_NULL) read(column, to.emplace());
+  if (sqlite3_column_type(statement_.get(), column) != SQLITE_NULL) read(column, to.emplace());
 }
 
 std::string SqlStatement::text(int column) const {
-  const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+  const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
   if (!bytes) return {};
-  return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
+  return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
 }
 
 void SqlStatement::read(int column, SqlBlob<std::string> to) const {
-  const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_, column));
-  to.bytes.assign(bytes ? bytes : "",
-                  bytes ? static_cast<std::size_t>(sqlite3_column_bytes(statement_, column)) : 0);
+  const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_.get(), column));
+  to.bytes.assign(
+      bytes ? bytes : "",
+      bytes ? static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column)) : 0);
 }
 
 Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {
@@ -169,29 +161,19 @@ Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {
   return database;
 }
 
-Database::Database(Database&& other) noexcept { *this = std::move(other); }
-
-Database& Database::operator=(Database&& other) noexcept {
-  std::swap(handle_, other.handle_);
-  std::swap(file_, other.file_);
-  return *this;
-}
-
-Database::~Database() { sqlite3_close_v2(handle_); }
-
 Status Database::exec(const std::string& sql, const std::string& operation) {
-  if (sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
-    return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_),
-                     sqlite3_errmsg(handle_), handle_);
+  if (sqlite3_exec(handle_.get(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
+    return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_.get()),
+                     sqlite3_errmsg(handle_.get()), handle_.get());
   }
   return {};
 }
 
 Result<SqlStatement> Database::prepare(const std::string& sql, const std::string& operation) const {
   sqlite3_stmt* statement = nullptr;
-  if (sqlite3_prepare_v2(handle_, sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
-    return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_),
-                     sqlite3_errmsg(handle_), handle_);
+  if (sqlite3_prepare_v2(handle_.get(), sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
+    return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_.get()),
+                     sqlite3_errmsg(handle_.get()), handle_.get());
   }
   return SqlStatement(statement, file_.string(), operation);
 }
@@ -209,13 +191,13 @@ Result<SqlTransaction> SqlTransaction::begin(Database& database) {
 
 Status SqlTransaction::commit() {
   RETURN_IF_ERROR(database_->exec("COMMIT", "commit"));
-  database_ = nullptr;
+  static_cast<void>(database_.release());
   return {};
 }
 
-SqlTransaction::~SqlTransaction() {
+void SqlTransaction::RollBack::operator()(Database* database) const {
   // Nothing can be done about an error here: the next open rolls back as well.
-  if (database_) static_cast<void>(database_->exec("ROLLBACK", "roll back"));
+  static_cast<void>(database->exec("ROLLBACK", "roll back"));
 }
 
 }  // namespace gapfarm

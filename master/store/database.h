@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +19,11 @@ struct sqlite3_stmt;
 
 namespace gapfarm {
 
+struct SqlClose {
+  void operator()(sqlite3* handle) const;
+  void operator()(sqlite3_stmt* statement) const;
+};
+
 // Bytes that are no text: to be bound, or a place to read them into.
 template <class Bytes>
 struct SqlBlob {
@@ -29,10 +35,6 @@ SqlBlob(Bytes&) -> SqlBlob<Bytes>;
 // A prepared statement.  May not outlive its Database.  Parameters count from 1, columns from 0.
 class SqlStatement {
  public:
-  SqlStatement(SqlStatement&&) noexcept;
-  SqlStatement& operator=(SqlStatement&&) noexcept;
-  ~SqlStatement();
-
   SqlStatement& bind(int index, std::int64_t value);
   SqlStatement& bind(int index, double value);  // NaN becomes NULL
   SqlStatement& bind(int index, std::optional<double> value);
@@ -91,7 +93,7 @@ class SqlStatement {
   friend class Database;
   SqlStatement(sqlite3_stmt* statement, std::string file, std::string operation);
 
-  sqlite3_stmt* statement_ = nullptr;
+  std::unique_ptr<sqlite3_stmt, SqlClose> statement_;
   std::string file_;
   std::string operation_;
   int bind_result_ = 0;
@@ -111,10 +113,6 @@ class Database {
 
   // Opens without reading: damage shows at the first statement.
   static Result<Database> open(const std::filesystem::path& file, Mode mode);
-
-  Database(Database&&) noexcept;
-  Database& operator=(Database&&) noexcept;
-  ~Database();
 
   // Runs statements that give no rows.  `operation` completes "cannot ...".
   Status exec(const std::string& sql, const std::string& operation);
@@ -159,7 +157,7 @@ class Database {
  private:
   Database(sqlite3* handle, std::filesystem::path file) : handle_(handle), file_(std::move(file)) {}
 
-  sqlite3* handle_ = nullptr;
+  std::unique_ptr<sqlite3, SqlClose> handle_;
   std::filesystem::path file_;
 };
 
@@ -168,18 +166,16 @@ class SqlTransaction {
  public:
   // Takes the write lock at once, so that a busy file is met before work is done.
   static Result<SqlTransaction> begin(Database& database);
-  SqlTransaction(SqlTransaction&& other) noexcept : database_(other.database_) {
-    other.database_ = nullptr;
-  }
-  SqlTransaction& operator=(SqlTransaction&&) = delete;
-  ~SqlTransaction();
-
   Status commit();
 
  private:
   explicit SqlTransaction(Database& database) : database_(&database) {}
 
-  Database* database_;
+  struct RollBack {
+    void operator()(Database* database) const;
+  };
+
+  std::unique_ptr<Database, RollBack> database_;
 };
 
 }  // namespace gapfarm

@@ -5,102 +5,13 @@
 #include <system_error>
 
 #include "common/base/try.h"
+#include "master/store/tables.h"
 
 namespace gapfarm {
 namespace {
 
-// Schema 1.  Comments inside the statements stay in the file and show in `.schema`.
-constexpr const char* kTables = R"sql(
-CREATE TABLE run (             -- one row: what was fixed when the run was created
-  id INTEGER PRIMARY KEY CHECK (id = 1),
-  program_version TEXT NOT NULL,
-  fingerprint TEXT NOT NULL,   -- of the build
-  created TEXT NOT NULL,       -- UTC
-  config_path TEXT NOT NULL,
-  config TEXT NOT NULL,        -- the file's text
-  overrides TEXT NOT NULL,     -- JSON, command-line options
-  problem BLOB NOT NULL,       -- gapfarm.v1.Problem
-  problem_hash TEXT NOT NULL,
-  seed TEXT NOT NULL,          -- unsigned 64 bits, decimal
-  numeric_class TEXT NOT NULL,
-  fitness TEXT NOT NULL,
-  fitness_unit TEXT NOT NULL,
-  higher_is_better INTEGER NOT NULL
-) STRICT;
-CREATE TABLE generations (
-  generation INTEGER PRIMARY KEY,
-  best REAL, mean REAL, median REAL, worst REAL,  -- fitness over the OK individuals
-  diversity REAL NOT NULL,
-  operator_probabilities TEXT NOT NULL,           -- JSON object
-  evaluations INTEGER NOT NULL,                   -- since the run began
-  wall_s REAL NOT NULL,                           -- of this generation
-  quarantined INTEGER NOT NULL,
-  optimiser_state BLOB NOT NULL,                  -- after this generation
-  digest TEXT NOT NULL                            -- over this and all earlier generations
-) STRICT;
-CREATE TABLE individuals (
-  generation INTEGER NOT NULL REFERENCES generations ON DELETE CASCADE,
-  rank INTEGER NOT NULL,       -- 0: best
-  birth_id INTEGER NOT NULL,
-  genome BLOB NOT NULL,        -- doubles in [0, 1], the machine's byte order
-  parameters TEXT NOT NULL,    -- JSON object: parameter to value
-  outcome TEXT NOT NULL,
-  fitness REAL,                -- NULL unless the outcome is OK
-  scores INTEGER NOT NULL,     -- evaluations behind the fitness
-  parents TEXT NOT NULL,       -- JSON array of birth ids
-  operators TEXT NOT NULL,
-  PRIMARY KEY (generation, rank)
-) STRICT;
-CREATE INDEX individuals_by_birth ON individuals (birth_id);
-CREATE TABLE progress (        -- one row: what the master last said about itself
-  id INTEGER PRIMARY KEY CHECK (id = 1),
-  state TEXT NOT NULL,
-  stop_reason TEXT NOT NULL,   -- while it runs: what it waits for
-  pid INTEGER NOT NULL,
-  host TEXT NOT NULL,
-  heartbeat REAL NOT NULL,     -- Unix time
-  rate_per_s REAL NOT NULL,
-  time_left_s REAL,
-  done INTEGER NOT NULL,       -- tasks of the generation in work
-  total INTEGER NOT NULL,
-  workers TEXT NOT NULL,       -- JSON array
-  epoch INTEGER NOT NULL       -- masters that have written to this run
-) STRICT;
-)sql";
-
 // From schema i + 1 to i + 2.  New files go the same way, so there is one way to each schema.
-constexpr const char* kUpgrades[] = {
-    R"sql(
-ALTER TABLE progress ADD COLUMN
-  farm TEXT NOT NULL DEFAULT '{}' /* JSON object: counts over all masters of this run */;
-CREATE TABLE incidents (       -- what somebody should look at, as it happened
-  generation INTEGER NOT NULL, -- in work then
-  kind TEXT NOT NULL,          -- quarantine: a task was given up; alarm: two answers to one task
-  time REAL NOT NULL,          -- Unix time
-  text TEXT NOT NULL
-) STRICT;
-)sql",
-    R"sql(
-CREATE TABLE documents (       -- what was worked out once, so that a report needs no simulation
-  name TEXT PRIMARY KEY,       -- "outcome": the log as the best predicts it (docs/run_store.md)
-  generation INTEGER NOT NULL, -- it is of
-  content TEXT NOT NULL        -- JSON
-) STRICT;
-)sql",
-    R"sql(
-CREATE TABLE worker_events (   -- who came and went, and why
-  time REAL NOT NULL,          -- Unix time
-  kind TEXT NOT NULL,          -- joined, returned, left, silent, died, refused; master, end (of one)
-  worker TEXT NOT NULL,        -- its name; of a master: empty
-  host TEXT NOT NULL,
-  text TEXT NOT NULL
-) STRICT;
-)sql",
-    R"sql(
-ALTER TABLE individuals ADD COLUMN
-  objectives TEXT NOT NULL DEFAULT '' /* JSON object, of several objectives; else empty */;
-)sql",
-};
+constexpr const char* kUpgrades[] = {kToSchema2, kToSchema3, kToSchema4, kToSchema5};
 static_assert(std::size(kUpgrades) + 1 == kRunStoreSchema);
 
 Status upgrade_from(Database& database, std::int64_t schema, const std::string& operation) {
@@ -119,7 +30,7 @@ std::filesystem::path run_store_file(const std::filesystem::path& run) {
 
 Status create_run_tables(Database& database) {
   const std::string operation = "create the run store";
-  RETURN_IF_ERROR(database.exec(kTables, operation));
+  RETURN_IF_ERROR(database.exec(kSchema1, operation));
   RETURN_IF_ERROR(database.exec("PRAGMA application_id = " + std::to_string(kRunStoreApplicationId),
                                 operation));
   return upgrade_from(database, 1, operation);

@@ -5,6 +5,7 @@
 
 #include "master/cli/app.h"
 #include "master/cli/completion_candidates.h"
+#include "master/cli/completion_scripts.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {
@@ -14,45 +15,6 @@ struct CompletionOptions {
   std::string shell;
   std::vector<std::string> arguments;
 };
-
-constexpr const char* kBash = R"(# gapfarm for bash: gapfarm completion bash
-_gapfarm() {
-  local line words=("${COMP_WORDS[@]:1:COMP_CWORD}")
-  COMPREPLY=()
-  while IFS= read -r line; do
-    COMPREPLY+=("${line%%$'\t'*}")
-  done < <(gapfarm completion words -- "${words[@]}" 2>/dev/null)
-  if [[ ${#COMPREPLY[@]} -eq 1 && ${COMPREPLY[0]} == *[/=] ]]; then compopt -o nospace; fi
-}
-complete -F _gapfarm gapfarm
-)";
-
-constexpr const char* kZsh = R"(#compdef gapfarm
-# gapfarm for zsh: gapfarm completion zsh
-_gapfarm() {
-  local line
-  local -a whole more
-  for line in "${(@f)$(gapfarm completion words -- "${(@)words[2,CURRENT]}" 2>/dev/null)}"; do
-    [[ -n $line ]] || continue
-    if [[ ${line%%$'\t'*} == *[/=] ]]; then
-      more+=("${line%%$'\t'*}")
-    else
-      whole+=("${${line%%$'\t'*}//:/\\:}:${line#*$'\t'}")
-    fi
-  done
-  (( ${#whole} )) && _describe gapfarm whole
-  (( ${#more} )) && compadd -S '' -a more
-}
-if [[ ${funcstack[1]} == _gapfarm ]]; then _gapfarm "$@"; else compdef _gapfarm gapfarm; fi
-)";
-
-constexpr const char* kFish = R"(# gapfarm for fish: gapfarm completion fish
-function __gapfarm_words
-    set -l words (commandline -opc) (commandline -ct)
-    gapfarm completion words -- $words[2..-1] 2>/dev/null
-end
-complete -c gapfarm -f -a '(__gapfarm_words)'
-)";
 
 Result<int> print_candidates(const CompletionOptions& options, CliContext& context) {
   const std::unique_ptr<Program> program = make_program();
