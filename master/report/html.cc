@@ -7,6 +7,10 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <span>
+#include <utility>
+
+#include "common/base/ranges.h"
 
 namespace gapfarm {
 namespace {
@@ -27,55 +31,33 @@ std::string scientific_text(double size, int digits) {
   return fmt::format("{:.{}g} × 10{}", size / std::pow(10, power), digits, raised);
 }
 
-}  // namespace
+using Escape = std::pair<char, std::string_view>;
 
-std::string html_escaped(std::string_view text) {
+constexpr Escape kInHtml[] = {
+    {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
+constexpr Escape kInScript[] = {{'<', "\\u003c"}, {'>', "\\u003e"}, {'&', "\\u0026"}};
+
+std::string escaped(std::string_view text, std::span<const Escape> escapes) {
   std::string out;
   out.reserve(text.size());
   for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        if (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n') {
-          out += "\xEF\xBF\xBD";
-        } else {
-          out += c;
-        }
-    }
-  }
-  return out;
-}
-
-std::string script_safe(std::string json) {
-  std::string out;
-  out.reserve(json.size());
-  for (const char c : json) {
-    if (c == '<') {
-      out += "\\u003c";
-    } else if (c == '>') {
-      out += "\\u003e";
-    } else if (c == '&') {
-      out += "\\u0026";
+    const bool control = static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n';
+    if (const Escape* escape = find_by(escapes, c, &Escape::first)) {
+      out += escape->second;
+    } else if (control) {
+      out += "\xEF\xBF\xBD";
     } else {
       out += c;
     }
   }
   return out;
 }
+
+}  // namespace
+
+std::string html_escaped(std::string_view text) { return escaped(text, kInHtml); }
+
+std::string script_safe(std::string_view json) { return escaped(json, kInScript); }
 
 std::string number_text(double value, int digits) {
   if (!std::isfinite(value)) return kDash;

@@ -12,7 +12,7 @@ std::string html_escaped(std::string_view text);
 
 // JSON that can stand inside a <script> element: nothing in it can end the element or open a
 // comment.  Still the same JSON.
-std::string script_safe(std::string json);
+std::string script_safe(std::string_view json);
 
 // Of numbers in a page's data: plots do not need more, and the page stays small.
 inline constexpr int kPlotDigits = 7;
