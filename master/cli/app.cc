@@ -19,15 +19,6 @@
 namespace gapfarm {
 namespace {
 
-// While it lives, the first SIGINT or SIGTERM goes to `stop` (a flag and a descriptor to poll), and
-// a second one ends the process at once with 128 + signal.  At most one at a time.
-class UserInterrupts {
- public:
-  explicit UserInterrupts(StopSource* stop);
-  ~UserInterrupts();
-  UserInterrupts& operator=(UserInterrupts&&) = delete;
-};
-
 // A handler takes no argument, so the one instance that signals go to has to be global.
 std::atomic<StopSource*> target{nullptr};
 
@@ -39,24 +30,30 @@ void handle(int signal) {
   errno = saved_errno;
 }
 
-void install(void (*handler)(int)) {
-  struct sigaction action = {};
-  sigemptyset(&action.sa_mask);
-  action.sa_handler = handler;  // without SA_RESTART, so that blocking calls return
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
+// While it lives, the first SIGINT or SIGTERM goes to `stop` (a flag and a descriptor to poll), and
+// a second one ends the process at once with 128 + signal.  At most one at a time.
+class UserInterrupts {
+ public:
+  explicit UserInterrupts(StopSource* stop) {
+    assert(target.load() == nullptr);
+    target.store(stop);
+    install(handle);
+  }
+  ~UserInterrupts() {
+    install(SIG_DFL);
+    target.store(nullptr);
+  }
+  UserInterrupts& operator=(UserInterrupts&&) = delete;
 
-UserInterrupts::UserInterrupts(StopSource* stop) {
-  assert(target.load() == nullptr);
-  target.store(stop);
-  install(handle);
-}
-
-UserInterrupts::~UserInterrupts() {
-  install(SIG_DFL);
-  target.store(nullptr);
-}
+ private:
+  static void install(void (*handler)(int)) {
+    struct sigaction action = {};
+    sigemptyset(&action.sa_mask);
+    action.sa_handler = handler;  // without SA_RESTART, so that blocking calls return
+    sigaction(SIGINT, &action, nullptr);
+    sigaction(SIGTERM, &action, nullptr);
+  }
+};
 
 constexpr const char* kExamples =
     "Examples:\n"

@@ -10,19 +10,18 @@
 #include "common/base/result.h"
 #include "common/json/json.h"
 #include "common/log/log.h"
+#include "common/process/process_pool.h"
 #include "common/progress/number_text.h"
 #include "common/progress/overall_progress.h"
 
 namespace gapfarm {
 
-// Of a clock that only goes forward, from any beginning.
-double steady_now_s();
-
 class Console {
  public:
   using Clock = double (*)();  // seconds; never goes back
 
-  explicit Console(std::FILE* out = stdout, std::FILE* err = stderr, Clock clock = steady_now_s);
+  explicit Console(std::FILE* out = stdout, std::FILE* err = stderr,
+                   Clock clock = monotonic_seconds);
   ~Console();
   Console& operator=(Console&&) = delete;
 

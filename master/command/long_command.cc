@@ -176,7 +176,7 @@ StageHooks LongCommand::hooks() {
 void LongCommand::entered() {
   counts_itself_ = false;
   stage_began_ = now_;
-  const ProgressView view = progress_.at(steady_now_s());
+  const ProgressView view = progress_.at(monotonic_seconds());
   stage_ = view.stage;
   if (view.number > 0 && view.number <= record_.plan.size()) {
     record_.plan[view.number - 1].began_unix_s = unix_now_s();
@@ -185,13 +185,13 @@ void LongCommand::entered() {
 }
 
 void LongCommand::stage(std::size_t k, std::uint64_t tasks) {
-  const bool goes_on = progress_.at(steady_now_s()).number == k + 1;
-  progress_.begin(k, steady_now_s(), tasks);
+  const bool goes_on = progress_.at(monotonic_seconds()).number == k + 1;
+  progress_.begin(k, monotonic_seconds(), tasks);
   if (!goes_on) entered();
 }
 
 void LongCommand::stage(const std::string& name) {
-  if (progress_.begin(name, steady_now_s())) entered();
+  if (progress_.begin(name, monotonic_seconds())) entered();
 }
 
 void LongCommand::found(Finding finding) {
@@ -221,7 +221,7 @@ void LongCommand::on_progress(const RecordedProgress& progress, const Farm& farm
   workers_ = farm.workers();
   fleets_ = farm.fleets();
   const auto there = std::count_if(workers_.begin(), workers_.end(), present);
-  const std::string waiting = wait.message(there, steady_now_s()).value_or("");
+  const std::string waiting = wait.message(there, monotonic_seconds()).value_or("");
   const bool news = waiting.empty() != waiting_.empty();
   waiting_ = waiting;
   show(news);
@@ -242,15 +242,15 @@ void LongCommand::farm_gone() {
 }
 
 void LongCommand::show(bool news) {
-  const ProgressView view = progress_.at(steady_now_s());
+  const ProgressView view = progress_.at(monotonic_seconds());
   console_.progress(record_.command + ": " + (waiting_.empty() ? progress_line(view) : waiting_),
                     news);
-  if (steady_now_s() - written_s_ >= kRecordInterval_s) write_record();
+  if (monotonic_seconds() - written_s_ >= kRecordInterval_s) write_record();
 }
 
 void LongCommand::write_record() {
   if (!keeps()) return;
-  written_s_ = steady_now_s();
+  written_s_ = monotonic_seconds();
   static_cast<ProgressView&>(record_) = progress_.at(written_s_);
   if (record_.state == "finished") record_.share = 1;
   record_.waiting = waiting_;

@@ -15,8 +15,6 @@ namespace {
 
 // False for what an honest worker never sends: no outcome, an OK of another kind than the task's,
 // or a fitness that is no finite number.
-bool answers(const v1::Task& task, const v1::TaskResult& result);
-
 bool answers(const v1::Task& task, const v1::TaskResult& result) {
   const v1::Outcome outcome = result.outcome();
   if (outcome == v1::OUTCOME_UNSPECIFIED || !v1::Outcome_IsValid(outcome)) return false;

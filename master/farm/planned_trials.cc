@@ -7,8 +7,10 @@
 #include <string>
 
 #include "common/base/ranges.h"
+#include "common/base/try.h"
 #include "common/random/stream.h"
 #include "common/score/motion_model.h"
+#include "master/farm/farm.h"
 
 namespace gapfarm {
 namespace {
@@ -153,6 +155,25 @@ std::vector<v1::Task> simulate_tasks(const std::vector<std::vector<v1::PlannedTr
     tasks.push_back(std::move(task));
   }
   return tasks;
+}
+
+Problem without_log(Problem problem) {
+  problem.log = {};
+  problem.genes.clear();
+  problem.fitness.kind = FitnessKind::kLogScore;
+  return problem;
+}
+
+Result<TrialLog> simulated_log(const std::vector<v1::TaskResult>& results, const std::string& what,
+                               const std::string& remedy) {
+  TrialLog log;
+  for (const v1::TaskResult& result : results) {
+    RETURN_IF_ERROR(ended_well(result, what, remedy));
+    for (const v1::Trial& trial : result.simulate().trials()) {
+      log.trials.push_back(from_proto(trial));
+    }
+  }
+  return log;
 }
 
 }  // namespace gapfarm

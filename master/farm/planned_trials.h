@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/config/settings.h"
 #include "common/problem/problem.h"
 #include "gapfarm/v1/task.pb.h"
@@ -29,5 +31,13 @@ std::vector<std::vector<v1::PlannedTrial>> plan_of(const Problem& problem, const
 std::vector<v1::Task> simulate_tasks(const std::vector<std::vector<v1::PlannedTrial>>& plan,
                                      const std::vector<v1::Override>& overrides, std::uint64_t seed,
                                      double path_interval_s);
+
+// The problem as simulations need it: without log and genes, and with a fitness that asks nothing
+// of either.
+Problem without_log(Problem problem);
+
+// The trials that simulate_tasks() gave.  Errors: ended_well()'s.
+Result<TrialLog> simulated_log(const std::vector<v1::TaskResult>& results, const std::string& what,
+                               const std::string& remedy = "");
 
 }  // namespace gapfarm

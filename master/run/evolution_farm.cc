@@ -22,27 +22,14 @@ std::optional<IncidentKind> incident_of(FarmEvent::Kind kind) {
   return std::nullopt;
 }
 
-// As the store names it; null: nobody came or went.
-const char* coming_or_going(FarmEvent::Kind kind) {
-  switch (kind) {
-    case FarmEvent::kJoined:
-      return "joined";
-    case FarmEvent::kReturned:
-      return "returned";
-    case FarmEvent::kRefused:
-      return "refused";
-    case FarmEvent::kLeft:
-      return "left";
-    case FarmEvent::kSilent:
-      return "silent";
-    case FarmEvent::kDied:
-      return "died";
-    case FarmEvent::kBadMessage:
-      return "refused";
-    default:
-      return nullptr;
-  }
-}
+using FarmKindName = std::pair<FarmEvent::Kind, const char*>;
+
+// Who came or went, as the store names it.
+constexpr FarmKindName kComingsAndGoings[] = {
+    {FarmEvent::kJoined, "joined"},     {FarmEvent::kReturned, "returned"},
+    {FarmEvent::kRefused, "refused"},   {FarmEvent::kLeft, "left"},
+    {FarmEvent::kSilent, "silent"},     {FarmEvent::kDied, "died"},
+    {FarmEvent::kBadMessage, "refused"}};
 
 // The last of what a user's program had no answer to, and how many there are; else empty.
 std::string failures_among(const Problem& problem, const std::vector<v1::Task>& tasks,
@@ -68,7 +55,7 @@ void FarmEventKeeper::keep(const FarmEvent& event) {
     // The run goes on when it cannot be written, as with the live row.
     if (Status s = store_.add_incident(*kind, event.text); !s) watcher_.error(s.error());
   }
-  const char* name = coming_or_going(event.kind);
+  const auto* name = find_by(kComingsAndGoings, event.kind, &FarmKindName::first);
   // Whoever comes and is refused again and again is not to fill the disk.
   if (name == nullptr || kept_ >= kMostWorkerEvents) return;
   ++kept_;
@@ -79,7 +66,7 @@ void FarmEventKeeper::keep(const FarmEvent& event) {
     host = known->second;
     hosts_.erase(known);
   }
-  waiting_.push_back({unix_now_s(), name, event.worker, std::move(host), event.text});
+  waiting_.push_back({unix_now_s(), name->second, event.worker, std::move(host), event.text});
 }
 
 void FarmEventKeeper::flush() {

@@ -23,10 +23,7 @@ namespace {
 
 class SteadyClock : public EvolveClock {
  public:
-  double now_s() const override {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return std::chrono::duration<double>(now).count();
-  }
+  double now_s() const override { return monotonic_seconds(); }
 };
 
 // What a run begins with, read before any farm is there.

@@ -52,10 +52,10 @@ Status measure_evaluation(const Config& config, CliContext& context, Summary* su
   // The first one brings the problem to the worker, which is nothing beside a long one.
   constexpr double kLong_s = 1;
   for (unsigned replicate = 0; replicate < 2; ++replicate) {
-    const double began_s = steady_now_s();
+    const double began_s = monotonic_seconds();
     ASSIGN_OR_RETURN(const auto results,
                      farm->run(hash, {evaluation_task({0, replicate, {}}, config.seed)}));
-    summary->evaluation_s = steady_now_s() - began_s;
+    summary->evaluation_s = monotonic_seconds() - began_s;
     summary->evaluated = results.front();
     if (summary->evaluation_s > kLong_s) break;
   }

@@ -180,9 +180,7 @@ Result<Config> figure_config(const EffectsOptions& options) {
     config = std::move(read);
   }
   Problem& problem = config.problem;
-  problem.log = {};
-  problem.genes.clear();
-  problem.fitness.kind = FitnessKind::kLogScore;
+  problem = without_log(std::move(problem));
   for (const Srv1 row : {Srv1::kDriveNoiseCommon, Srv1::kDriveNoiseSide, Srv1::kPoseNoisePosition,
                          Srv1::kPoseNoiseHeading}) {
     problem.values[row_of(row)] = problem.table()[row_of(row)].lower;

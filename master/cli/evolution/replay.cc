@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/trials/text/csv.h"
@@ -30,60 +31,60 @@ struct ReplayOptions {
   Outputs outputs;
 };
 
-struct Found {
-  StoredIndividual individual;
-  std::uint64_t generation = 0;
-};
+using Found = RunReader::Member;
+using Individuals = std::vector<StoredIndividual>;
 
-// The individual as the latest generation up to `until` has it.
-Result<Found> find_individual(const RunReader& reader, std::uint64_t birth_id,
-                              std::optional<std::uint64_t> until) {
+// Whom `choose` finds in the latest generation up to `until` that has one; none: it finds nobody.
+template <class Choose>
+Result<std::optional<Found>> latest(const RunReader& reader, std::optional<std::uint64_t> until,
+                                    Choose choose) {
   ASSIGN_OR_RETURN(const auto generations, reader.generations());
   for (auto g = generations.rbegin(); g != generations.rend(); ++g) {
     if (until && g->generation > *until) continue;
-    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g->generation));
-    for (const StoredIndividual& individual : individuals) {
-      if (individual.birth_id == birth_id) return Found{individual, g->generation};
+    ASSIGN_OR_RETURN(const Individuals individuals, reader.individuals(g->generation));
+    if (const StoredIndividual* one = choose(individuals)) {
+      return std::optional(Found{g->generation, *one});
     }
   }
-  return Error{reader.run().string() + ": no generation" +
-               (until ? " up to " + std::to_string(*until) : "") + " holds genome " +
-               std::to_string(birth_id) + "; --genome best is its best, and `sqlite3 " +
-               reader.run().string() +
-               "/run.sqlite 'SELECT DISTINCT birth_id FROM individuals'` lists them"};
+  return std::optional<Found>();
 }
 
-// The best of the latest generation up to `until`.
-Result<Found> find_best(const RunReader& reader, std::optional<std::uint64_t> until) {
-  ASSIGN_OR_RETURN(const auto generations, reader.generations());
-  for (auto g = generations.rbegin(); g != generations.rend(); ++g) {
-    if (until && g->generation > *until) continue;
-    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g->generation));
-    const StoredIndividual* best = nullptr;
-    const bool higher = reader.info().higher_is_better;
-    // Of several objectives the first is the knee.
-    if (!individuals.empty() && !individuals.front().objectives.empty()) {
-      return Found{individuals.front(), g->generation};
-    }
-    for (const StoredIndividual& other : individuals) {
-      if (!other.fitness) continue;
-      const bool better = best == nullptr || (higher ? *other.fitness > *best->fitness
-                                                     : *other.fitness < *best->fitness);
-      if (better) best = &other;
-    }
-    if (best != nullptr) return Found{*best, g->generation};
+// Of several objectives the first is the knee.  Null: nobody ended well.
+const StoredIndividual* best_of(const Individuals& individuals, bool higher_is_better) {
+  const StoredIndividual* best = nullptr;
+  if (!individuals.empty() && !individuals.front().objectives.empty()) return &individuals.front();
+  for (const StoredIndividual& other : individuals) {
+    if (!other.fitness) continue;
+    const bool better = best == nullptr || (higher_is_better ? *other.fitness > *best->fitness
+                                                             : *other.fitness < *best->fitness);
+    if (better) best = &other;
   }
-  return Error{reader.run().string() +
-               ": no generation holds an individual that ended well; evolve it further"};
+  return best;
 }
 
 Result<Found> find(const RunReader& reader, const ReplayOptions& options) {
-  if (options.genome == "best") return find_best(reader, options.generation);
+  const auto& until = options.generation;
+  const std::string run = reader.run().string();
+  if (options.genome == "best") {
+    ASSIGN_OR_RETURN(auto best, latest(reader, until, [&](const Individuals& all) {
+                       return best_of(all, reader.info().higher_is_better);
+                     }));
+    if (best) return *std::move(best);
+    return Error{run + ": no generation holds an individual that ended well; evolve it further"};
+  }
   const auto id = parse_integer(options.genome);
   if (!id || *id < 0) {
     return Error{"--genome is '" + options.genome + "', expected a birth id or 'best'"};
   }
-  return find_individual(reader, static_cast<std::uint64_t>(*id), options.generation);
+  const auto birth_id = static_cast<std::uint64_t>(*id);
+  ASSIGN_OR_RETURN(auto found, latest(reader, until, [&](const Individuals& all) {
+                     return find_by(all, birth_id, &StoredIndividual::birth_id);
+                   }));
+  if (found) return *std::move(found);
+  return Error{run + ": no generation" + (until ? " up to " + std::to_string(*until) : "") +
+               " holds genome " + std::to_string(birth_id) +
+               "; --genome best is its best, and `sqlite3 " + run +
+               "/run.sqlite 'SELECT DISTINCT birth_id FROM individuals'` lists them"};
 }
 
 // A duplicate took its score from the first individual of that genome: who that is.
@@ -130,17 +131,7 @@ class Replay {
                                                                          individual.genome.end());
     }
     ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
-    TrialLog log;
-    for (const v1::TaskResult& result : results) {
-      if (result.outcome() != v1::OK) {
-        return Error{"the drive ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                     result.message() + ")"};
-      }
-      for (const v1::Trial& trial : result.simulate().trials()) {
-        log.trials.push_back(from_proto(trial));
-      }
-    }
-    return log;
+    return simulated_log(results, "the drive");
   }
 
  private:

@@ -176,12 +176,8 @@ Result<Watched> watch_window(Farm& farm, const Problem& problem, const Trial& wi
   return watched;
 }
 
-struct BestOf {
-  StoredIndividual individual;
-  std::uint64_t generation = 0;
-};
-
-Result<BestOf> best_of(const RunReader& reader, std::optional<std::uint64_t> generation) {
+Result<RunReader::Member> best_of(const RunReader& reader,
+                                  std::optional<std::uint64_t> generation) {
   if (!generation) {
     ASSIGN_OR_RETURN(const auto generations, reader.generations());
     if (generations.empty()) return Error{"no generation was completed yet; look again later"};
@@ -192,7 +188,7 @@ Result<BestOf> best_of(const RunReader& reader, std::optional<std::uint64_t> gen
     return Error{"the run has no generation " + std::to_string(*generation)};
   }
   if (individuals.front().outcome != "OK") return Error{"nothing of it ended well"};
-  return BestOf{individuals.front(), *generation};
+  return RunReader::Member{*generation, individuals.front()};
 }
 
 std::string title_of(const Trial& trial, std::size_t number, bool window) {

@@ -98,21 +98,12 @@ Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, 
                                  {{"drive sessions", 1, plan.size()}}, context);
   ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
   context.work->stage(0);
-  Problem problem = config.problem;
-  problem.log = {};
-  problem.genes.clear();
-  problem.fitness.kind = FitnessKind::kLogScore;
-  const std::string hash = asked->add_problem(to_proto(problem));
+  const std::string hash = asked->add_problem(to_proto(without_log(config.problem)));
   ASSIGN_OR_RETURN(
       const auto results,
       asked->run(hash, simulate_tasks(plan, {}, config.seed, config.simulate.path_interval_s)));
-  TrialLog log;
-  for (const v1::TaskResult& result : results) {
-    RETURN_IF_ERROR(
-        ended_well(result, "the simulation", "; these parameters do not make a robot that drives"));
-    for (const v1::Trial& trial : result.simulate().trials())
-      log.trials.push_back(from_proto(trial));
-  }
+  ASSIGN_OR_RETURN(auto log, simulated_log(results, "the simulation",
+                                           "; these parameters do not make a robot that drives"));
   return shifted(std::move(log), source.frame_x_m, source.frame_y_m);
 }
 

@@ -4,12 +4,15 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
+#include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/diagnose/effect_diagnosis.h"
 
 namespace gapfarm {
 namespace {
+
+constexpr auto kOutOfReach = [](auto& v, auto& row) { FIELDS(effect, level, size); };
 
 std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t number,
                                           const CheckPaths& paths,
@@ -62,14 +65,10 @@ Status make_empty(const std::string& folder) {
 }  // namespace
 
 Status write_check_state(const CheckState& state, const std::string& path) {
-  Json out_of_reach = Json::array();
-  for (const OutOfReach& o : state.out_of_reach) {
-    out_of_reach.push_back({{"effect", o.effect}, {"level", o.level}, {"size", o.size}});
-  }
   const Json json = {{"version", 1},
                      {"made_of", state.made_of},
                      {"asked", state.asked},
-                     {"out_of_reach", out_of_reach}};
+                     {"out_of_reach", FieldWriter::list(state.out_of_reach, kOutOfReach)}};
   return write_file_atomically(path, json_text(json, 1) + "\n");
 }
 
@@ -84,11 +83,8 @@ Result<CheckState> read_check_state(const std::string& path) {
   if (json.contains("asked") && json["asked"].is_string()) {
     state.asked = json["asked"].get<std::string>();
   }
-  const Json out_of_reach = json.value("out_of_reach", Json::array());
-  for (const Json& o : out_of_reach) {
-    state.out_of_reach.push_back(
-        {o.value("effect", ""), o.value("level", ""), o.value("size", 1.0)});
-  }
+  state.out_of_reach =
+      LenientFields::list<OutOfReach>(json.value("out_of_reach", Json()), kOutOfReach);
   return state;
 }
 

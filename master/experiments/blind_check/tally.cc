@@ -81,9 +81,7 @@ Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
                    simulate_cases(config, truths, plan, /*seed_offset=*/1, farm, progress));
   std::vector<std::optional<FreshScores>> scores;
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    Problem problem = config.problem;
-    problem.genes.clear();
-    problem.fitness.kind = FitnessKind::kLogScore;
+    Problem problem = without_log(config.problem);
     problem.log = std::move(logs[i]);
     for (Trial& trial : problem.log.trials) trial.path.clear();
     for (const v1::Override& o : overrides_of(problem.table(), truths[i])) {

@@ -19,12 +19,6 @@ std::string trimmed(std::string text) {
   return text;
 }
 
-std::string joined(const std::vector<std::string>& values, const std::string& between) {
-  std::string all;
-  for (const std::string& word : values) all += (all.empty() ? "" : between) + word;
-  return all;
-}
-
 std::string user_name() {
   const passwd* entry = getpwuid(geteuid());
   return entry == nullptr ? std::to_string(geteuid()) : entry->pw_name;

@@ -137,17 +137,6 @@ PushedPiece::Push PushedPiece::push(const Pose& X_WR, std::span<const TipSample>
   return push;
 }
 
-// The pushes of a plan.  Every piece is put down where its trial begins, whatever happened before;
-// it is logged there and at its end with the effects and the noise of both readings.  A trial
-// without a finger's way is an invalid request.
-v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
-                               const v1::SimulateTask& task, StepCounter* steps);
-
-// The true way of the piece in the push of `task.trial`, from where the log has its start; noisy:
-// from beside it by a reading's noise.
-v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
-                          const v1::TraceTask& task, StepCounter* steps);
-
 class PushSession {
  public:
   PushSession(const Problem& problem, const ParameterValues& values, const v1::SimulateTask& task,
@@ -228,11 +217,16 @@ class PushSession {
   std::map<std::string, PushedPiece> pieces_;
 };
 
+// The pushes of a plan.  Every piece is put down where its trial begins, whatever happened before;
+// it is logged there and at its end with the effects and the noise of both readings.  A trial
+// without a finger's way is an invalid request.
 v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
                                const v1::SimulateTask& task, StepCounter* steps) {
   return PushSession(problem, values, task, steps).run();
 }
 
+// The true way of the piece in the push of `task.trial`, from where the log has its start; noisy:
+// from beside it by a reading's noise.
 v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
                           const v1::TraceTask& task, StepCounter* steps) {
   v1::TaskResult result;

@@ -254,10 +254,7 @@ BlindDesign deal(const ParameterTable& table, const DesignSettings& settings, Dr
 Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::vector<Truth>& cases,
                                              const SessionPlans& plan, std::uint64_t seed_offset,
                                              Farm& farm, const DesignProgress& progress) {
-  Problem problem = config.problem;
-  problem.log = {};
-  problem.genes.clear();
-  problem.fitness.kind = FitnessKind::kLogScore;  // asks nothing of the log
+  const Problem problem = without_log(config.problem);
   std::vector<v1::Task> tasks;
   std::vector<std::size_t> owner;
   for (std::size_t i = 0; i < cases.size(); ++i) {
