@@ -11,7 +11,7 @@
 #include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
-#include "common/progress/overall_progress.h"
+#include "common/progress/stage_clock.h"
 #include "common/trials/select.h"
 #include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"

@@ -11,7 +11,7 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "common/progress/overall_progress.h"
+#include "common/progress/finding.h"
 #include "master/diagnose/result/diagnosis.h"
 #include "master/farm/farm.h"
 #include "master/infer/predictor.h"

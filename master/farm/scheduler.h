@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "master/farm/job_queue.h"
-#include "master/farm/sites/fleet_registry.h"
 #include "master/farm/worker_registry.h"
 
 namespace gapfarm {

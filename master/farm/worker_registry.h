@@ -11,6 +11,7 @@
 #include "common/process/process_pool.h"
 #include "gapfarm/v1/farm.pb.h"
 #include "master/farm/farm.h"
+#include "master/farm/sites/fleet_status.h"
 #include "master/farm/worker_identity.h"
 
 namespace gapfarm {
@@ -83,6 +84,24 @@ class WorkerRegistry {
   std::unordered_map<std::string, WorkerRecord*> by_peer_;
   std::unordered_map<std::string, WorkerRecord*> by_name_;
   std::vector<WorkerStatus> gone_;  // the latest
+};
+
+// Times are seconds of the caller's clock.
+class FleetRegistry {
+ public:
+  // False: this is no fleet's report, or there are too many fleets.
+  bool hear(const std::string& peer, const v1::Fleet& report, double now);
+  // Of those that were heard of lately.
+  std::vector<FleetStatus> status(double now) const;
+  std::vector<std::string> peers() const;
+
+ private:
+  struct Heard {
+    std::string peer;
+    FleetStatus status;
+    double at = 0;
+  };
+  std::map<std::string, Heard> fleets_;  // by name
 };
 
 }  // namespace gapfarm

@@ -7,7 +7,7 @@
 #include "common/base/guarded.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
-#include "common/progress/overall_progress.h"
+#include "common/progress/stage_clock.h"
 #include "master/ground/reference.h"
 #include "master/ground/report/ground_report.h"
 #include "master/ground/tolerances.h"

@@ -10,7 +10,7 @@
 
 #include "common/base/interval.h"
 #include "common/base/result.h"
-#include "common/progress/overall_progress.h"
+#include "common/progress/finding.h"
 #include "common/recordings/run.h"
 #include "common/robot/robot.h"
 #include "common/score/pose_readings.h"

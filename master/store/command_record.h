@@ -10,6 +10,7 @@
 
 #include "common/base/result.h"
 #include "common/json/json.h"
+#include "common/progress/finding.h"
 #include "common/progress/overall_progress.h"
 #include "master/store/records.h"
 

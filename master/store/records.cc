@@ -5,8 +5,12 @@
 #include <numeric>
 
 #include "common/base/hash.h"
+#include "common/base/ranges.h"
+#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
+#include "common/math/fronts.h"
+#include "gapfarm/v1/problem.pb.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -97,6 +101,106 @@ std::string generation_digest(const std::string& previous, const StoredGeneratio
     for (const auto& [name, value] : individual.objectives) hasher.add(value);
   }
   return hasher.finish();
+}
+
+namespace {
+
+// Members that ended well, with their objectives.
+std::vector<StoredIndividual> complete(std::vector<StoredIndividual> members,
+                                       std::size_t objectives) {
+  std::erase_if(members, [&](const StoredIndividual& member) {
+    return member.objectives.size() != objectives;
+  });
+  return members;
+}
+
+std::vector<Costs> all_costs(const RunFront& front, const std::vector<StoredIndividual>& members) {
+  return mapped(members, [&](const StoredIndividual& member) { return front.costs(member); });
+}
+
+// Costs of the objectives' own senses, and back.
+std::vector<double> turned(const RunFront& front, std::vector<double> values) {
+  for (std::size_t m = 0; m < values.size(); ++m) {
+    if (front.objectives[m].maximise) values[m] = -values[m];
+  }
+  return values;
+}
+
+}  // namespace
+
+std::vector<double> RunFront::costs(const StoredIndividual& member) const {
+  std::vector<double> values;
+  for (const auto& [name, value] : member.objectives) values.push_back(value);
+  return turned(*this, std::move(values));
+}
+
+Result<RunFront> run_front(const RunReader& reader,
+                           const std::vector<StoredGeneration>& generations) {
+  RunFront front;
+  v1::Problem problem;
+  if (!problem.ParseFromString(reader.info().problem)) return front;
+  for (const v1::SearchedObjective& objective : problem.fitness().objectives()) {
+    front.objectives.push_back({objective.name(), objective.maximise()});
+  }
+  const std::size_t objectives = front.objectives.size();
+  if (objectives == 0 || generations.empty()) return front;
+  for (const StoredGeneration& generation : generations) {
+    std::optional<double>& volume = front.hypervolume.emplace_back();
+    for (const auto& [name, value] : generation.operator_probabilities) {
+      if (name == "hypervolume") volume = value;
+    }
+    if (!front.reference.empty()) continue;
+    ASSIGN_OR_RETURN(auto members, reader.individuals(generation.generation));
+    members = complete(std::move(members), objectives);
+    if (members.empty()) continue;
+    front.reference = turned(front, greatest_of(all_costs(front, members)));
+  }
+  ASSIGN_OR_RETURN(auto last, reader.individuals(generations.back().generation));
+  last = complete(std::move(last), objectives);
+  if (last.empty()) return front;
+  const std::uint64_t best = last.front().birth_id;
+  for (const std::size_t i : first_front(all_costs(front, last))) front.members.push_back(last[i]);
+  std::ranges::stable_sort(front.members, [](const StoredIndividual& a, const StoredIndividual& b) {
+    return a.objectives.front().second < b.objectives.front().second;
+  });
+  for (std::size_t i = 0; i < front.members.size(); ++i) {
+    if (front.members[i].birth_id == best) front.knee = i;
+  }
+  const std::vector<Costs> costs = all_costs(front, front.members);
+  front.ideal = turned(front, least_of(costs));
+  front.nadir = turned(front, greatest_of(costs));
+  return front;
+}
+
+Json to_json(const RunFront& front) {
+  Json objectives = Json::array(), members = Json::array(), volumes = Json::array();
+  const auto at = [](const std::vector<double>& values, std::size_t m) {
+    return m < values.size() ? Json(values[m]) : Json(nullptr);
+  };
+  for (std::size_t m = 0; m < front.objectives.size(); ++m) {
+    objectives.push_back({{"name", front.objectives[m].name},
+                          {"maximise", front.objectives[m].maximise},
+                          {"ideal", at(front.ideal, m)},
+                          {"nadir", at(front.nadir, m)},
+                          {"reference", at(front.reference, m)}});
+  }
+  for (const StoredIndividual& member : front.members) {
+    Json values = Json::object();
+    for (const auto& [name, value] : member.objectives) values[name] = value;
+    members.push_back({{"birth_id", member.birth_id},
+                       {"objectives", std::move(values)},
+                       {"fitness", number_or_null(member.fitness)},
+                       {"values", parse_json(member.values)}});
+  }
+  for (const std::optional<double>& volume : front.hypervolume) {
+    volumes.push_back(number_or_null(volume));
+  }
+  const Json knee =
+      front.members.empty() ? Json(nullptr) : Json(front.members[front.knee].birth_id);
+  return {{"objectives", std::move(objectives)},
+          {"knee", knee},
+          {"members", std::move(members)},
+          {"hypervolume", std::move(volumes)}};
 }
 
 }  // namespace gapfarm

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "master/io/robot_files/drive_facts.h"
+#include "master/io/robot_files/controllers.h"
 
 namespace gapfarm {
 

@@ -1,14 +1,62 @@
 // Controller files of ros_control and ros2_control (YAML).
 #pragma once
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/io/robot_files/drive_facts.h"
+#include "master/io/robot_files/urdf/urdf.h"
 
 namespace gapfarm {
+
+struct StatedNumber {
+  double value = 0;  // SI
+  std::string key;   // as the file writes it
+  int line = 0;
+};
+
+struct StatedJoints {
+  std::vector<std::string> names;
+  std::string key;
+  int line = 0;
+};
+
+// One controller or plugin.
+struct DriveFacts {
+  std::string file;
+  int line = 0;
+  std::string name;  // husky_velocity_controller
+  std::string type;  // diff_drive_controller/DiffDriveController, or the plugin's library
+  std::string
+      drive;  // differential, ackermann, tricycle, mecanum, omni, planar, tracked; "": unsaid
+  // By their names in ros2_controllers: wheel_separation, wheel_radius,
+  // wheel_separation_multiplier, left_wheel_radius_multiplier, right_wheel_radius_multiplier,
+  // wheelbase, traction_track_width, steering_track_width, lx_plus_ly, robot_radius, wheel_offset,
+  // cmd_vel_timeout, max_velocity, max_acceleration, max_angular_velocity,
+  // max_angular_acceleration, max_steering, wheels_per_side.
+  std::map<std::string, StatedNumber> numbers;
+  // left, right, traction, steering, omni, front_left, front_right, rear_left, rear_right.
+  std::map<std::string, StatedJoints> joints;
+
+  const StatedNumber* number(const std::string& name) const;
+  // All joints named under any of `roles`, in that order, each once.
+  std::vector<std::string> joints_of(const std::vector<std::string>& roles) const;
+  // "controllers.yaml:12".
+  std::string place(int at_line) const;
+};
+
+// Puts one "key = value" (keys of maps joined by dots, a list as several values) where it belongs.
+// False when no table knows the key.
+bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::string>& values,
+               int line);
+
+// The drive that a controller's or plugin's type names; empty when none.
+std::string drive_of_type(std::string_view type);
+
+// The plugins of `model` that drive it.
+std::vector<DriveFacts> plugin_facts(const UrdfModel& model);
 
 struct ControllerFile {
   std::string file;

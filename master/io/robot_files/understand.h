@@ -7,7 +7,7 @@
 
 #include "common/robot/robot.h"
 #include "master/io/robot_files/chassis.h"
-#include "master/io/robot_files/drive_facts.h"
+#include "master/io/robot_files/controllers.h"
 
 namespace gapfarm {
 
