@@ -49,7 +49,6 @@ std::string head(const PageFrame& frame) {
   return html + "</head>\n";
 }
 
-
 std::string top(const PageFrame& frame) {
   std::string links;
   for (const auto& [id, label] : frame.places) {
