@@ -1,10 +1,12 @@
 string(REPLACE "," ";" FOLDERS "${FOLDERS}")
 set(sources)
 foreach(folder IN LISTS FOLDERS)
-  file(GLOB found RELATIVE ${SOURCE_DIR} ${SOURCE_DIR}/${folder}/*.h ${SOURCE_DIR}/${folder}/*.cc
-       ${SOURCE_DIR}/${folder}/*.inc ${SOURCE_DIR}/${folder}/gapfarm/v1/*.proto)
+  # A library's sub-folders are its own, too.
+  file(GLOB_RECURSE found RELATIVE ${SOURCE_DIR} ${SOURCE_DIR}/${folder}/*.h
+       ${SOURCE_DIR}/${folder}/*.cc ${SOURCE_DIR}/${folder}/*.inc ${SOURCE_DIR}/${folder}/*.proto)
   list(APPEND sources ${found})
 endforeach()
+list(REMOVE_DUPLICATES sources)
 list(APPEND sources configs/robots/srv1.toml)
 list(SORT sources)
 set(all "${COMPILER};${BULLET};${EIGEN};${BUILD_TYPE};${SANITIZE}")
