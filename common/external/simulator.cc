@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cmath>
 
+#include "common/base/shell.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/process/child.h"
@@ -31,12 +32,6 @@ std::string shown_line(std::string text) {
     if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
   }
   return "'" + text + (cut ? "...'" : "'");
-}
-
-std::string shell_quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
-  return text + "'";
 }
 
 std::string in_seconds(double seconds) { return formatted("%g s", seconds); }

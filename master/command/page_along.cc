@@ -12,6 +12,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "common/base/shell.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/command/context.h"
@@ -123,8 +124,8 @@ Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
       address + "view?of=" + percent_encoded(folder.lexically_normal().string());
   context.console.note("page: " + view);
   context.console.note("  from another machine first: " + (*page)->tunnel());
-  context.console.note("  it ends with this command; gapfarm serve " + folder.string() +
-                       " shows the same at any time");
+  context.console.note("  it ends with this command; gapfarm serve " +
+                       shell_quoted(folder.string()) + " shows the same at any time");
   if (named) context.console.note("metrics: " + address + "metrics");
   return page;
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <sstream>
 
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/model.h"
@@ -105,12 +106,14 @@ std::string action(const RunReport& report, const RunInfo& info) {
     if (bound_hit(row) == BoundHit::kNone) continue;
     return "Widen the range of " + row.key + " in [genes]: the best value lies at its end.";
   }
-  if (report.objective) return "gapfarm resume " + report.name + " --generations N searches on.";
-  if (!report.outcome) return "gapfarm resume " + report.name + " goes on.";
+  if (report.objective)
+    return "gapfarm resume " + shell_quoted(report.name) + " --generations N searches on.";
+  if (!report.outcome) return "gapfarm resume " + shell_quoted(report.name) + " goes on.";
   if (report.outcome->validation.empty()) {
     return "Judge it on trials that it has not seen: gapfarm predict RUN --trials OTHER.csv";
   }
-  return "Ask what is missing: gapfarm diagnose " + info.config_path + " --out DIAGNOSIS";
+  return "Ask what is missing: gapfarm diagnose " + shell_quoted(info.config_path) +
+         " --out DIAGNOSIS";
 }
 
 std::string program_text(const Problem& problem) {

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
@@ -149,13 +150,14 @@ Result<Model> current_best(const RunReader& run) {
   if (generations.empty()) {
     return Error{name +
                  ": no generation is complete yet; wait for the first, see `gapfarm status " +
-                 name + "`"};
+                 shell_quoted(name) + "`"};
   }
   const StoredGeneration& last = generations.back();
   // By number: another generation may be committed meanwhile.
   ASSIGN_OR_RETURN(const auto members, run.individuals(last.generation));
   if (members.empty() || !members.front().fitness) {
-    return Error{name + ": nothing has ended well yet; see `gapfarm status " + name + "`"};
+    return Error{name + ": nothing has ended well yet; see `gapfarm status " + shell_quoted(name) +
+                 "`"};
   }
   return model_of_member(run, members.front(), last.generation);
 }

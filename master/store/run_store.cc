@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "common/base/build_info.h"
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/store/run_reader.h"
@@ -101,7 +102,7 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   const fs::path file = run / "run.sqlite";
   if (!is_unborn(file)) {
     return Error{run.string() + ": holds a run already; continue it with `gapfarm resume " +
-                 run.string() + "`, or choose another --out"};
+                 shell_quoted(run.string()) + "`, or choose another --out"};
   }
   ASSIGN_OR_RETURN(Database database, Database::open(file, Database::Mode::kCreate));
   RunInfo complete = info;

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
@@ -178,7 +179,8 @@ Result<int> run_init(InitOptions& options, CliContext& context) {
   }
   RETURN_IF_ERROR(options.outputs.write(options.out, text));
   console.result(options.out + ": a config for " + std::to_string(log.trials.size()) +
-                     " trials; answer its QUESTIONs, then: gapfarm check " + options.out + "\n",
+                     " trials; answer its QUESTIONs, then: gapfarm check " +
+                     shell_quoted(options.out) + "\n",
                  json);
   return kExitDone;
 }

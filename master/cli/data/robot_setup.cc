@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/robot/robot_file.h"
 #include "common/trials/files.h"
@@ -170,7 +171,7 @@ Result<int> run_init_robot(const std::vector<std::string>& arguments, const std:
   context.begun = true;
   RETURN_IF_ERROR(write_robot(setup, texts, outputs));
   console.result(out + ": a config for the robot in " + setup.robot +
-                     "; answer its QUESTIONs, then: gapfarm check " + out + "\n",
+                     "; answer its QUESTIONs, then: gapfarm check " + shell_quoted(out) + "\n",
                  json);
   return kExitDone;
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "master/command/long_command.h"
@@ -182,19 +183,19 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   if (!summary) return failed(summary.error(), context);
   show(*summary, store, config.problem, context.console);
   if (summary->stopped()) {
-    context.console.note("continue with: gapfarm resume " + run);
+    context.console.note("continue with: gapfarm resume " + shell_quoted(run));
     return kExitResumable;
   }
   if (summary->given_up == 0) {
     const auto& best = summary->evolved.best;
     if (!best || best->outcome == v1::OK) return kExitDone;
-    context.console.note("there is no model; what happened: gapfarm status " + run);
+    context.console.note("there is no model; what happened: gapfarm status " + shell_quoted(run));
     return kExitFailed;
   }
   context.console.note(fmt::format(
       "{} given up; which and why: gapfarm status {}",
       summary->given_up == 1 ? "1 task was" : std::to_string(summary->given_up) + " tasks were",
-      run));
+      shell_quoted(run)));
   return kExitQuarantined;
 }
 

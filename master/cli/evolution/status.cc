@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/cli/subcommand.h"
@@ -227,7 +228,8 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
   }
   screen.line("seed", "{}", info.seed);
   if (!status.digest.empty()) screen.line("digest", "{}", status.digest);
-  if (status.state == RunState::kStopped) screen.line("go on with", "gapfarm resume {}", run);
+  if (status.state == RunState::kStopped)
+    screen.line("go on with", "gapfarm resume {}", shell_quoted(run));
   return screen.text();
 }
 

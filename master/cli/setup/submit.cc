@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/shell.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/net/keys.h"
@@ -129,8 +130,9 @@ Result<int> run_submit(SubmitCommand command, CliContext& context) {
   ASSIGN_OR_RETURN(const Captured captured, run_captured(std::move(setup), script, kSubmitLimit_s));
   if (!captured.succeeded()) return Error{submit.front() + ": " + captured.err + captured.out};
   const std::string job = captured.out.substr(0, captured.out.find_first_of(" ;\n"));
-  context.console.result("job " + job + "; follow it with: gapfarm status " + run + " --watch\n",
-                         {{"job", job}, {"run", run}});
+  context.console.result(
+      "job " + job + "; follow it with: gapfarm status " + shell_quoted(run) + " --watch\n",
+      {{"job", job}, {"run", run}});
   return kExitDone;
 }
 

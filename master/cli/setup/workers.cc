@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
@@ -44,7 +45,8 @@ Result<std::string> endpoint_of(const WorkersCommand& command) {
   if (progress.state == RunState::kRunning && !progress.listen.empty()) {
     return reachable(progress.listen, progress.host);
   }
-  return Error{folder + ": no master of it listens for workers now; `gapfarm resume " + folder +
+  return Error{folder + ": no master of it listens for workers now; `gapfarm resume " +
+               shell_quoted(folder) +
                " --listen tcp://*:5555`, or let it bring them itself with --workers-on"};
 }
 

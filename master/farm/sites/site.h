@@ -76,7 +76,4 @@ std::vector<std::string> parse_submitted(const ClusterSite& site, unsigned count
                                          const std::string& output);
 bool is_site_limit(const ClusterSite& site, const std::string& output);
 
-// For a shell.
-std::string shell_quoted(const std::string& word);
-
 }  // namespace gapfarm

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "common/base/shell.h"
 #include "master/farm/sites/fleet.h"
 
 namespace gapfarm::site_test {
