@@ -27,6 +27,8 @@ std::string row_text(const Trial& trial) {
 
 std::string few_digits(double value) { return formatted("%.3g", value); }
 
+std::span<const LengthUnit> length_units() { return kUnits; }
+
 const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, double expected_m) {
   const LengthUnit* best = nullptr;
   double least = INFINITY;

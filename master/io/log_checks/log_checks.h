@@ -1,6 +1,7 @@
 // Checks of a log that do not depend on what moves.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct LengthUnit {
   const char* name = "";
   double metres = 1;
 };
+std::span<const LengthUnit> length_units();
 // The unit in which `logged` comes nearest to `expected_m`, among those that put it into
 // [lower_m, upper_m]; null where none does.
 const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, double expected_m);

@@ -30,6 +30,8 @@ double reach_of(const Piece& piece) {
 // aspect is 5 % off makes 0.05, pieces or pushes that are exchanged 0.03.
 constexpr double kTouches = 0.01, kApart = 0.03;
 constexpr double kTimesAsNear = 3;  // put right
+// Of the reach, of half of the pushes: a unit 2.54 times the right one leaves some 0.5.
+constexpr double kMeets = 0.1;
 
 // By how much a point lies outside a convex outline; inside it is negative.
 double outside(const Eigen::Vector2d& p_W, const Piece& piece, const Pose& X_WP) {
@@ -99,6 +101,54 @@ std::optional<SanityFinding> check_outlines(const Problem& problem, double reach
   return found;
 }
 
+// How deep in a piece where it ends, or how far from it, the finger's way goes: the median of
+// pushes, once logged lengths are so many metres.  Nothing is pushed by a finger that hardly moves.
+double misses(const Problem& problem, double piece_metres, double tip_metres, double reach_m) {
+  const double finger_m = problem.values[row_of(Push::kFingerRadius)];
+  std::vector<double> off, ways;
+  for (const Trial& t : problem.log.trials) {
+    if (t.tip.empty()) continue;
+    const Pose X_WE = {piece_metres * t.X_WE.x, piece_metres * t.X_WE.y, t.X_WE.theta};
+    double nearest = INFINITY, way = 0;
+    for (const TipSample& s : t.tip) {
+      way = std::max(way, std::hypot(s.x - t.tip.front().x, s.y - t.tip.front().y));
+      nearest = std::min(
+          nearest, outside({tip_metres * s.x, tip_metres * s.y}, problem.piece(t.command), X_WE));
+    }
+    off.push_back(std::abs(nearest - finger_m));
+    ways.push_back(tip_metres * way);
+  }
+  return median(ways) < kMeets * reach_m ? INFINITY : median(off);
+}
+
+// Finger and pieces are far apart: a unit is named where in it they touch, push by push.
+SanityFinding far_apart(const Problem& problem, double nearest_m, double reach_m) {
+  const std::string seen = "The finger comes no closer to a piece's middle than " +
+                           few_digits(nearest_m) +
+                           " m in half of the pushes, and the farthest corner lies " +
+                           few_digits(reach_m) + " m from it.";
+  SanityFinding found = {"frames_apart", seen,
+                         "Give finger and pieces in one frame, each push with its own finger's "
+                         "way, and check the outlines' unit."};
+  double least = kMeets * reach_m;
+  for (const LengthUnit& unit : length_units()) {
+    for (const bool pieces : {true, false}) {
+      for (const bool finger : {true, false}) {
+        const double left =
+            misses(problem, pieces ? unit.metres : 1, finger ? unit.metres : 1, reach_m);
+        if (left >= least || !(pieces || finger)) continue;
+        least = left;
+        const std::string whose = !finger ? "pieces" : !pieces ? "finger" : "pieces and finger";
+        found = {"unit_error",
+                 seen + " With the positions of " + whose + " in " + unit.name +
+                     " they meet within " + few_digits(1000 * left) + " mm.",
+                 "Multiply the positions of " + whose + " by " + few_digits(unit.metres) + "."};
+      }
+    }
+  }
+  return found;
+}
+
 }  // namespace
 
 void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) {
@@ -134,18 +184,7 @@ void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) 
     return;
   }
   if (near) return;
-  const LengthUnit* unit = likely_unit(nearest, 0, reach, reach / 2);
-  const std::string seen =
-      "The finger comes no closer to a piece's middle than " + few_digits(nearest) +
-      " m in half of the pushes, and the farthest corner lies " + few_digits(reach) + " m from it.";
-  if (unit != nullptr) {
-    findings->push_back(
-        {"unit_error", seen + " These look like " + unit->name + ".",
-         "Multiply the positions of pieces, finger or both by " + few_digits(unit->metres) + "."});
-  } else {
-    findings->push_back({"frames_apart", seen,
-                         "Give finger and pieces in one frame, and check the outlines' unit."});
-  }
+  findings->push_back(far_apart(problem, nearest, reach));
 }
 
 }  // namespace gapfarm

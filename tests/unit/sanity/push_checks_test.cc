@@ -8,6 +8,7 @@
 
 #include "common/parameters/push.h"
 #include "common/random/stream.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm::push_checks_test {
 
@@ -77,6 +78,29 @@ TEST(PushChecks, NameHowPosesDoNotFitTheFingersWay) {
       t.X_WE = c.change(t.X_WE);
     }
     EXPECT_EQ(named(problem), c.name);
+  }
+}
+
+// Pieces, finger or both in another unit are named as what they are; a finger elsewhere is no unit.
+TEST(PushChecks, NameTheUnitInWhichFingerAndPiecesMeet) {
+  const auto finding = [](double pieces, double tip, double shift) {
+    Problem problem = pushed();
+    for (Trial& t : problem.log.trials) {
+      for (Pose* X : {&t.X_WS, &t.X_WE}) X->x *= pieces, X->y *= pieces;
+      for (TipSample& s : t.tip) s.x = tip * s.x + shift, s.y *= tip;
+    }
+    std::vector<SanityFinding> findings;
+    check_pushes(problem, &findings);
+    return findings.empty() ? SanityFinding{} : findings.front();
+  };
+  for (const double units : {1000.0, 100.0}) {
+    const std::string by = " by " + few_digits(1 / units) + ".";
+    EXPECT_EQ(finding(units, units, 0).remedy, "Multiply the positions of pieces and finger" + by);
+    EXPECT_EQ(finding(units, 1, 0).remedy, "Multiply the positions of pieces" + by);
+    EXPECT_EQ(finding(1, units, 0).remedy, "Multiply the positions of finger" + by);
+  }
+  for (const double shift_m : {0.5, 4.0, 40.0}) {
+    EXPECT_EQ(finding(1, 1, shift_m).name, "frames_apart") << shift_m;
   }
 }
 
