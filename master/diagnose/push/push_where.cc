@@ -170,12 +170,10 @@ std::vector<std::string> push_cautions(const Study& study, const TrialLog& log) 
         "The finger always went equally fast: friction_speed hardly shows, and finger_compliance "
         "looks like a smaller finger.");
   }
-  const auto ground = study.base.find(row_of(Push::kGroundFriction));
-  if (one_speed(v) && ground != study.base.end()) {
-    add_caution("Pushes of one speed hardly show ground_friction, here " +
-                plain_number(ground->second) +
-                ": an angle of table_tilt is known only in proportion to it; measure it, and give "
-                "it in [parameters], not in [genes].");
+  if (one_speed(v) && study.base.count(row_of(Push::kGroundFriction)) > 0) {
+    add_caution(
+        "Pushes of one speed hardly show ground_friction, and an angle of table_tilt is known only "
+        "in proportion to it: measure it, and give it in [parameters], not in [genes].");
   }
   if (study.sessions > 1 && study.sessions <= 8) {
     add_caution("Effects are taken to be alike in all " + std::to_string(study.sessions) +
