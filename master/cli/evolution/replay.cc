@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/trials/text/csv.h"
@@ -83,8 +84,8 @@ Result<Found> find(const RunReader& reader, const ReplayOptions& options) {
   if (found) return *std::move(found);
   return Error{run + ": no generation" + (until ? " up to " + std::to_string(*until) : "") +
                " holds genome " + std::to_string(birth_id) +
-               "; --genome best is its best, and `sqlite3 " + run +
-               "/run.sqlite 'SELECT DISTINCT birth_id FROM individuals'` lists them"};
+               "; --genome best is its best, and `sqlite3 " + shell_quoted(run + "/run.sqlite") +
+               " 'SELECT DISTINCT birth_id FROM individuals'` lists them"};
 }
 
 // A duplicate took its score from the first individual of that genome: who that is.

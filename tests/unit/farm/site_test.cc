@@ -43,6 +43,8 @@ TEST(Sites, PlaceholdersAreReplacedAndLonelyOnesSplice) {
             (std::vector<std::string>{"p1", "x", "y z", "${HOME} {b}"}));
   EXPECT_EQ(expand("{two}\n{none}.", values), "x\ny z\n.");
   EXPECT_EQ(shell_quoted("it's"), "'it'\\''s'");
+  EXPECT_EQ(shell_quoted("run/my robot"), "'run/my robot'");
+  EXPECT_EQ(shell_quoted("run/robot-1"), "run/robot-1");
 }
 
 // What the systems' commands printed, kept as they printed it.
