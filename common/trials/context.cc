@@ -6,12 +6,15 @@
 #include <map>
 #include <string>
 
+#include "common/trials/pose_readings.h"
+
 namespace gapfarm {
 namespace {
 
 constexpr MoveTolerance kLeast{0.02, 0.1};
 constexpr MoveTolerance kGreatest{0.05, 0.35};
 constexpr double kScales = 5;
+constexpr double kStepsApart = 1.5;  // the square root of 2, and a margin
 
 struct Gap {
   double distance_m = 0;
@@ -73,6 +76,8 @@ int sign(double duty) { return duty > 0 ? 1 : duty < 0 ? -1 : 0; }
 }  // namespace
 
 MoveTolerance estimate_move_tolerance(const TrialLog& log) {
+  // Rounded twice, one resting pose may lie a step apart along either axis.
+  const double rounding_m = kStepsApart * pose_grid(log.trials).step_m;
   const auto before = predecessors(log);
   std::vector<double> distances, headings;
   for (std::size_t i = 0; i < before.size(); ++i) {
@@ -81,7 +86,8 @@ MoveTolerance estimate_move_tolerance(const TrialLog& log) {
     distances.push_back(found.distance_m);
     headings.push_back(found.heading_rad);
   }
-  return {tolerance(std::move(distances), kRayleigh, kLeast.distance_m, kGreatest.distance_m),
+  return {std::max(rounding_m, tolerance(std::move(distances), kRayleigh, kLeast.distance_m,
+                                         kGreatest.distance_m)),
           tolerance(std::move(headings), kFoldedNormal, kLeast.heading_rad, kGreatest.heading_rad)};
 }
 

@@ -47,7 +47,8 @@ struct MoveTolerance {
 // moves), refined by the median of the gaps within five scales, and five scales are the tolerance:
 // one trial in 270,000 that did not move is beyond it.  It is kept within [2 cm, 5 cm] and [0.1
 // rad, 0.35 rad]: logs that share one measurement have no noise to see but round to a centimetre,
-// and in logs where every trial was moved the quartile means nothing.
+// and in logs where every trial was moved the quartile means nothing.  Of positions that lie on a
+// grid it is no less than what rounding one resting pose twice may put between them.
 MoveTolerance estimate_move_tolerance(const TrialLog& log);
 
 // One context a trial, in the log's order.  REQUIRES: one command a trial.

@@ -10,7 +10,7 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "common/score/pose_readings.h"
+#include "common/trials/pose_readings.h"
 #include "master/diagnose/evidence/residuals.h"
 #include "master/infer/predictor.h"
 

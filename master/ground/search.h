@@ -13,7 +13,7 @@
 #include "common/progress/finding.h"
 #include "common/recordings/run.h"
 #include "common/robot/robot.h"
-#include "common/score/pose_readings.h"
+#include "common/trials/pose_readings.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/fit/wheel_loop.h"
 #include "master/ground/fit/window_fit.h"

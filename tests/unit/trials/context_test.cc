@@ -80,6 +80,24 @@ TEST(TrialContext, ReportsMovesFromNoiseAtEveryNoiseLevel) {
   }
 }
 
+// Seen in `gapfarm blind-check configs/srv1.toml --sizes clear --nulls 0 --left-out 0 --seed 41`,
+// case 14: a step of 22 mm passed for a hand, and starts after it for unsettled ones.
+TEST(TrialContext, ReportsNoMovesFromRounding) {
+  for (const double step_m : {0.01, 0.0219, 0.03}) {
+    TrialLog log = chained_log(400, 10, 0.001, 0.01, 5);
+    for (Trial& t : log.trials) {
+      for (Pose* X : {&t.X_WS, &t.X_WE}) {
+        X->x = step_m * std::round(X->x / step_m);
+        X->y = step_m * std::round(X->y / step_m);
+      }
+    }
+    const auto contexts = trial_contexts(log, same_command(log, {1, 1, 1}));
+    int moves = 0;
+    for (std::size_t i = 0; i < 400; ++i) moves += i % 10 != 0 && contexts[i].moved;
+    EXPECT_EQ(moves, 0) << step_m;
+  }
+}
+
 TEST(TrialContext, AMoveBeforeEveryTrialIsSeenToo) {
   const TrialLog log = chained_log(300, 1, 0.002, 0.01, 6);
   const auto contexts = trial_contexts(log, same_command(log, {1, 1, 1}));

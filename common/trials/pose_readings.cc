@@ -1,4 +1,4 @@
-#include "common/score/pose_readings.h"
+#include "common/trials/pose_readings.h"
 
 #include <algorithm>
 #include <cmath>
