@@ -75,9 +75,7 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
       }
       if (fitter.promise(fit, slopes, rows, values) < kLeastPromise) continue;
       WindowFit with = fitter.fit(rows, {}, values);
-      const double gain = (h.name == kFloorEdge ? gain_of_edge(fitter, with, fit)
-                                                : with.objective - fit.objective) -
-                          h.price;
+      const double gain = gain_of(fitter, h, with, fit);
       const bool less = with.values[values.size() - 1] < rows.back().row.nominal;
       if (gain < most || (h.only_more && less)) continue;
       most = gain;

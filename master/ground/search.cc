@@ -64,9 +64,7 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
     if (promised < kLeastPromise) return {index, std::max(promised, 0.0), {}};
   }
   *fit = fitter.fit(rows, {}, values);
-  const double gain = hypothesis.name == kFloorEdge ? gain_of_edge(fitter, *fit, search.fit)
-                                                    : fit->objective - search.fit.objective;
-  Offer offer{index, gain - hypothesis.price, {}};
+  Offer offer{index, gain_of(fitter, hypothesis, *fit, search.fit), {}};
   offer.values.resize(hypothesis.freed.size());
   for (std::size_t k = 0; k < hypothesis.freed.size(); ++k) {
     offer.values[k] = fit->values[row_index(rows, hypothesis.freed[k].name)];

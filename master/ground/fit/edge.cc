@@ -146,10 +146,15 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
   return best;
 }
 
-double gain_of_edge(const WindowFitter& fitter, const WindowFit& with, const WindowFit& without) {
-  if (!parts_windows(fitter, with)) return 0;
-  const double within = fitter.within_runs(with).objective - fitter.within_runs(without).objective;
-  return std::min(with.objective - without.objective, within);
+double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
+               const WindowFit& with, const WindowFit& without) {
+  double gain = with.objective - without.objective;
+  if (hypothesis.name == kFloorEdge) {
+    if (!parts_windows(fitter, with)) return 0;
+    gain =
+        std::min(gain, fitter.within_runs(with).objective - fitter.within_runs(without).objective);
+  }
+  return gain - hypothesis.price;
 }
 
 void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,

@@ -21,11 +21,12 @@ GroundHypothesis floor_edge();
 Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit,
                                 const std::vector<FitRow>& rows, const Eigen::VectorXd& values);
 
-// Nats that a fit with an edge gains over one without.  A line with all windows on one side is
-// another floor and no edge: nothing.  No more than it gains where every run has a share of its
-// travel of its own, too: of runs that last as long, those that get beyond a line are the fast
-// ones.
-double gain_of_edge(const WindowFitter& fitter, const WindowFit& with, const WindowFit& without);
+// Nats that a fit with a hypothesis gains over one without, its price paid.  An edge gains nothing
+// where all windows lie on one side, which is another floor; and no more than it does where every
+// run has a share of its travel of its own, too: of runs that last as long, those that get beyond a
+// line are the fast ones.
+double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
+               const WindowFit& with, const WindowFit& without);
 
 // Parameters and text of a named edge: how much less far wheels travel on the slower side, where
 // the line passes nearest to the middle of the log, and which side is slower.
