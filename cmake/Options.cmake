@@ -105,13 +105,8 @@ function(gapfarm_texts header)
     string(APPEND text "inline constexpr char ${name}[] = R\"text(${content})text\";\n\n")
   endforeach()
   string(APPEND text "}  // namespace gapfarm\n")
-  set(out ${PROJECT_BINARY_DIR}/${folder}/${header})
-  if(EXISTS ${out})
-    file(READ ${out} there)
-  endif()
-  if(NOT "${text}" STREQUAL "${there}")
-    file(WRITE ${out} "${text}")
-  endif()
+  # Written only where it differs; what stands in the text is not replaced once more.
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${folder}/${header} CONTENT "@text@" @ONLY)
 endfunction()
 
 # gapfarm_library(NAME [COLD] [PARTS n] SOURCES a.cc b.cc DEPS x y [SEPARATE c.cc...]
