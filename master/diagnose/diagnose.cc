@@ -39,8 +39,8 @@ struct Answer {
   std::optional<steps::Refit> refit;
 };
 
-Status answer(const steps::DiagnosisRequest& of, const steps::Evidence& measured, bool frees_base,
-              const std::function<void(int stage)>& begin, Answer* answer) {
+Status ask(const steps::DiagnosisRequest& of, const steps::Evidence& measured, bool frees_base,
+           const std::function<void(int stage)>& begin, Answer* answer) {
   begin(2);
   ASSIGN_OR_RETURN(answer->screening,
                    guarded([&] { return steps::screen(of, measured, frees_base); }));
@@ -64,7 +64,7 @@ Status ask_again(const steps::DiagnosisRequest& of, const steps::Evidence& measu
   const bool named = first->refit->judged.named.names_anything();
   if (named || !steps::beyond_search(of, measured.study)) return {};
   Answer second;
-  const Status asked = answer(
+  const Status asked = ask(
       of, measured, /*frees_base=*/true, [](int) {}, &second);
   if (!asked) return asked.error().code == ErrorCode::kSimulation ? Status() : asked;
   if (second.refit->judged.verdict == Verdict::kEffect) *first = std::move(second);
@@ -92,7 +92,7 @@ Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, StageClock
 
   Answer found;
   const auto begin = [&](int stage) { stages->begin(kDiagnosisStages[stage].name); };
-  Status answered = answer(of, *measured, /*frees_base=*/false, begin, &found);
+  Status answered = ask(of, *measured, /*frees_base=*/false, begin, &found);
   if (answered) answered = ask_again(of, *measured, &found);
   if (found.screening) known.screening = &*found.screening;
   if (found.judgement) known.judged = &*found.judgement;
