@@ -64,27 +64,37 @@ Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
 // Steps that moved the ends by many standard deviations, or by next to nothing, are taken again so
 // that they move them by a part of one: what a small change is, the motion says, not the bounds.
 Status rescale(Predictor& predictor, const Study& study, const SlopePoint& from,
-               const std::vector<SlopeRequest>& requests,
-               std::vector<std::optional<Slope>>* slopes) {
+               std::vector<SlopeRequest>* requests, std::vector<std::optional<Slope>>* slopes) {
   std::vector<SlopeRequest> again;
   std::vector<std::size_t> of;
-  for (std::size_t k = 0; k < requests.size(); ++k) {
+  for (std::size_t k = 0; k < requests->size(); ++k) {
     if (!(*slopes)[k]) continue;
+    const auto [parameter, step] = (*requests)[k];
     const double rows = static_cast<double>(3 * study.size());
     const double a_unit = std::sqrt(study.whiten(*(*slopes)[k]).squaredNorm() / rows);
-    const double moved = a_unit * requests[k].step;
+    const double moved = a_unit * step;
     if (!(a_unit > 0) || (moved > kLeastMove && moved < kMostMove)) continue;
-    const Parameter& row = predictor.problem().table()[requests[k].row];
-    const double step = std::min(kGoodMove / a_unit, kMostOfRange * (row.upper - row.lower));
-    again.push_back({requests[k].row, step});
+    const Parameter& row = predictor.problem().table()[parameter];
+    again.push_back(
+        {parameter, std::min(kGoodMove / a_unit, kMostOfRange * (row.upper - row.lower))});
     of.push_back(k);
   }
   if (again.empty()) return {};
   ASSIGN_OR_RETURN(auto better, slopes_at(predictor, from, again));
   for (std::size_t j = 0; j < of.size(); ++j) {
-    if (better[j]) (*slopes)[of[j]] = std::move(better[j]);
+    if (!better[j]) continue;
+    (*slopes)[of[j]] = std::move(better[j]);
+    (*requests)[of[j]] = again[j];
   }
   return {};
+}
+
+// A trial that jumps, across the rim of a patch, say, weighs no more than one that is far out.
+void bound_jumps(double step, Eigen::Ref<Eigen::VectorXd> slope) {
+  for (Eigen::Index i = 0; i < slope.size(); i += 3) {
+    const double moved2 = slope.segment<3>(i).squaredNorm() * step * step;
+    if (moved2 > kFarSquared) slope.segment<3>(i) *= std::sqrt(kFarSquared / moved2);
+  }
 }
 
 // Derivatives of the predictions there.  What cannot be moved at all has none, and stays.
@@ -97,10 +107,11 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   if (requests.empty()) return {};
   ASSIGN_OR_RETURN(const auto from, slope_point(predictor, study, fit->at, fit->ends));
   ASSIGN_OR_RETURN(auto slopes, slopes_at(predictor, from, requests));
-  if (Status s = rescale(predictor, study, from, requests, &slopes); !s) return s;
+  if (Status s = rescale(predictor, study, from, &requests, &slopes); !s) return s;
   for (std::size_t k = 0; k < slopes.size(); ++k) {
     if (!slopes[k]) continue;
     fit->jacobian.col(k) = study.whiten(*slopes[k]);
+    bound_jumps(requests[k].step, fit->jacobian.col(k));
   }
   return {};
 }
