@@ -35,37 +35,51 @@ void set_closed(const ClosedShare& closed, NamedEffect* effect) {
   effect->closed_hi = closed.hi;
 }
 
-// Of a fitted row, beside the others and the nuisances; none where the slopes say nothing.
-std::optional<double> bound_of(const Judgement& judged, std::size_t row) {
-  const JointFit& fit = *judged.named.estimates;
-  const Study& study = judged.named.study();
+// The least standard deviation of a fitted row, beside the others and the nuisances, and that of
+// the fit; infinite where the slopes say nothing, 0 where the row is not in the fit.
+struct Deviation {
+  double least = 0, fitted = 0;
+};
+
+Deviation deviation_of(const JointFit& fit, const Study& study, const Eigen::MatrixXd& nuisances,
+                       std::size_t row) {
   Eigen::MatrixXd slopes = fit.jacobian;
   study.drop_ignored(slopes);
-  Eigen::MatrixXd information = infer::information(slopes, judged.named.evidence->nuisances);
+  Eigen::MatrixXd information = infer::information(slopes, nuisances);
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const BaseParameter& p = study.base_parameters[k];
     information(k, k) += 1 / std::pow(p.prior_log_sd * study.base.at(p.row), 2);
   }
   const Eigen::VectorXd least = infer::least_deviations(information);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
-    const double bound = least[k] * std::sqrt(judged.scale);
-    if (fit.parameters[k].row == row && std::isfinite(bound)) return bound;
+    const FittedParameter& p = fit.parameters[k];
+    if (p.row == row) return {least[k] * p.bent, p.standard_error};
   }
   return {};
 }
 
+// Beside the nuisances to first order, or beside all of the base, whichever leaves more open.
+Deviation deviation_of(const Refit& refit, std::size_t row) {
+  const Explanation& named = refit.judged.named;
+  const NestedFit& last = refit.nested.back();
+  const Eigen::MatrixXd none(3 * last.study.size(), 0);
+  const Deviation held =
+      deviation_of(*named.estimates, named.study(), named.evidence->nuisances, row);
+  const Deviation free = deviation_of(last.fit, last.study, none, row);
+  const double scale = std::sqrt(refit.judged.scale);
+  return {std::max(held.least * scale, free.least), std::max(held.fitted * scale, free.fitted)};
+}
+
 // One row of the table with what the fit and what lies beyond it leave open.
-Estimate reported_estimate(const DiagnosisRequest& of, const Judgement& judged,
+Estimate reported_estimate(const DiagnosisRequest& of, const Refit& refit,
                            const ChosenEffect& chosen, std::size_t row, double value) {
+  const Judgement& judged = refit.judged;
   const JointFit& estimates = *judged.named.estimates;
   const Parameter& p = of.table()[row];
   Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
-  double fit_error = 0;
-  for (const FittedParameter& fitted : estimates.parameters) {
-    if (fitted.row != row) continue;
-    fit_error = fitted.standard_error * std::sqrt(judged.scale);
-    e.sd = fit_error;
-  }
+  const Deviation deviation = deviation_of(refit, row);
+  double fit_error = deviation.fitted;
+  if (fit_error > 0) e.sd = fit_error;
   // What the base could take over is part of it where both were searched.
   const Overrides& searched = judged.named.searched_error;
   if (const auto wide = searched.find(row); wide != searched.end()) {
@@ -80,7 +94,7 @@ Estimate reported_estimate(const DiagnosisRequest& of, const Judgement& judged,
     e.lo = std::max(e.lo, p.lower);
     e.hi = std::min(e.hi, p.upper);
   }
-  e.bound = bound_of(judged, row);
+  if (deviation.least > 0 && std::isfinite(deviation.least)) e.bound = deviation.least;
   if (e.bound) e.width_over_bound = half / kNormal90 / *e.bound;
   const double frame = of.frame_of(p.key, estimates.at);
   for (double* bound : {&e.value, &e.lo, &e.hi}) *bound += frame;
@@ -100,7 +114,7 @@ NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size
   for (const auto& [row, value] : named.estimates->at) {
     const Parameter& p = of.table()[row];
     if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
-    effect.parameters.push_back(reported_estimate(of, refit.judged, chosen, row, value));
+    effect.parameters.push_back(reported_estimate(of, refit, chosen, row, value));
   }
   if (is_seam(effect.name)) {
     effect.axis = named.estimates->at.at(of.table().row(effect.name + ".axis")) == 0 ? "x" : "y";

@@ -116,9 +116,6 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   return {};
 }
 
-// Directions go round: beyond the one bound they come in at the other.
-bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); }
-
 double within(const Parameter& row, double value) {
   if (!goes_round(row)) return std::clamp(value, row.lower, row.upper);
   const double turn = row.upper - row.lower;
@@ -131,13 +128,8 @@ double scaled_step(const Parameter& row, double from, double to) {
   return to - from - turn * std::round((to - from) / turn);
 }
 
-struct Normal {
-  Eigen::MatrixXd matrix;
-  Eigen::VectorXd right;
-};
-
 // Prior of the base parameters about the tuned base, in their own units.
-void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
+void add_prior(const Study& study, const JointFit& fit, StepEquations* normal) {
   const std::vector<BaseParameter>& base = study.base_parameters;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const double sd = base[k].prior_log_sd * study.base.at(base[k].row);
@@ -172,8 +164,8 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   all << fit->jacobian, nuisances;
   const Eigen::VectorXd z = study.whiten(fit->residuals);
   const Eigen::VectorXd weight = weights_of(study, z);
-  Normal normal{all.transpose() * weight.asDiagonal() * all,
-                all.transpose() * weight.asDiagonal() * z};
+  StepEquations normal{all.transpose() * weight.asDiagonal() * all,
+                       all.transpose() * weight.asDiagonal() * z};
   normal.matrix.diagonal().tail(q).array() += 1;
   add_prior(study, *fit, &normal);
   const Eigen::MatrixXd inverse = inverse_of_symmetric(normal.matrix);
@@ -188,12 +180,9 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
     lower[k] = std::max(lower[k], row.lower - parameter.value);
   }
   const Eigen::VectorXd delta = bounded_minimum(normal.matrix, normal.right, lower, upper);
+  shift(problem.table(), delta, fit);
   for (Eigen::Index k = 0; k < p; ++k) {
-    FittedParameter& parameter = fit->parameters[k];
-    const Parameter& row = problem.table()[parameter.row];
-    parameter.value = within(row, parameter.value + delta[k]);
-    parameter.standard_error = std::sqrt(std::max(0.0, inverse(k, k)));
-    fit->at[parameter.row] = parameter.value;
+    fit->parameters[k].standard_error = std::sqrt(std::max(0.0, inverse(k, k)));
   }
 }
 
@@ -236,26 +225,42 @@ Result<Moved> moved_on(Predictor& predictor, const Study& study, const Eigen::Ma
   return next;
 }
 
+StepEquations equations_of(const Study& study, const JointFit& fit, const Eigen::VectorXd& z,
+                           const Eigen::VectorXd& weight) {
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * fit.jacobian;
+  StepEquations normal{fit.jacobian.transpose() * weighted, weighted.transpose() * z};
+  add_prior(study, fit, &normal);
+  return normal;
+}
+
 // To the parameters that fit without fold `f`, to first order.
 Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
                              const std::vector<std::size_t>& fold_of, std::size_t f) {
   const Eigen::VectorXd z = study.whiten(fit.residuals);
   const bool only = *std::max_element(fold_of.begin(), fold_of.end()) == 0;
-  const Eigen::Index p = fit.jacobian.cols();
-  Normal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    if (fold_of[i] == f && !only) continue;
-    const auto at = static_cast<Eigen::Index>(3 * i);
-    const double weight = weight_of(study, at / 3, z);
-    const auto rows = fit.jacobian.middleRows(at, 3);
-    normal.matrix += weight * rows.transpose() * rows;
-    normal.right += weight * rows.transpose() * z.segment<3>(at);
+  Eigen::VectorXd weight = weights_of(study, z);
+  for (std::size_t i = 0; i < study.size() && !only; ++i) {
+    if (fold_of[i] == f) weight.segment<3>(static_cast<Eigen::Index>(3 * i)).setZero();
   }
-  add_prior(study, fit, &normal);
+  const StepEquations normal = equations_of(study, fit, z, weight);
   return solve_symmetric(normal.matrix, normal.right);
 }
 
 }  // namespace
+
+bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); }
+
+StepEquations step_equations(const Study& study, const JointFit& fit) {
+  const Eigen::VectorXd z = study.whiten(fit.residuals);
+  return equations_of(study, fit, z, weights_of(study, z));
+}
+
+void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* fit) {
+  for (std::size_t k = 0; k < fit->parameters.size(); ++k) {
+    FittedParameter& p = fit->parameters[k];
+    fit->at[p.row] = p.value = within(table[p.row], p.value + move[k]);
+  }
+}
 
 double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
   const Eigen::VectorXd z = study.whiten(fit.residuals);

@@ -15,6 +15,7 @@ struct FittedParameter {
   std::size_t row = 0;
   double value = 0;
   double standard_error = 0;
+  double bent = 1;  // by how much that is wider than slopes say (profile.h)
 };
 
 struct JointFit {
@@ -33,6 +34,17 @@ enum class BaseParameters { kHeld, kFitted };
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<EffectCandidate>& effects, const Overrides& start,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds);
+
+// Of a step that makes the misfit smaller, by a fit's derivatives, without nuisances.
+struct StepEquations {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+};
+StepEquations step_equations(const Study& study, const JointFit& fit);
+// Directions go round: beyond the one bound they come in at the other.
+bool goes_round(const Parameter& row);
+// Moves the parameters by so much, within their bounds; predictions and derivatives stay.
+void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* fit);
 
 // What a fit makes smaller: Huber's function of every trial's distance once the nuisances have
 // taken their part, and what that and the parameters cost under their priors.

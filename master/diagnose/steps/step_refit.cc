@@ -6,6 +6,7 @@
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
+#include "master/diagnose/fit/profile.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/steps/watch.h"
 
@@ -65,6 +66,9 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
     ASSIGN_OR_RETURN(auto fit,
                      fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted,
                                  none, alone ? base_rounds : kMostRounds));
+    if (!alone && count == named.chosen.size()) {
+      ASSIGN_OR_RETURN(fit, profiled(of.predictor, fitted_in, effects, std::move(fit), 2));
+    }
     std::string name =
         named.as_logged ? "the tuned base, late readings put right" : "the tuned base";
     for (std::size_t k = 0; k < effects.size(); ++k) {
