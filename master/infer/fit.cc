@@ -289,8 +289,4 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
   return scores;
 }
 
-Eigen::MatrixXd Fitter::covariance(const Fit& fit) const {
-  return inverse_of_symmetric(normal(fit, std::nullopt).matrix);
-}
-
 }  // namespace gapfarm::infer

@@ -76,8 +76,6 @@ class Fitter {
   // Log score of every observation from fits to the other folds, linear steps from this one.
   // REQUIRES: slopes.
   std::vector<double> held_out(const Fit& fit) const;
-  // Covariance of the coordinates, from the slopes.
-  Eigen::MatrixXd covariance(const Fit& fit) const;
 
  private:
   struct Normal {

@@ -98,27 +98,6 @@ Overrides Space::values(const Eigen::VectorXd& u) const {
   return values;
 }
 
-Overrides Space::deviations(const Eigen::VectorXd& u, const Eigen::MatrixXd& covariance) const {
-  constexpr double kStep = 1e-4;
-  std::map<std::size_t, Eigen::VectorXd> slopes;
-  for (Eigen::Index k = 0; k < dimensions_; ++k) {
-    Eigen::VectorXd up = u, down = u;
-    up[k] += kStep;
-    down[k] -= kStep;
-    const Overrides below = values(down);
-    for (const auto& [row, value] : values(up)) {
-      Eigen::VectorXd& slope =
-          slopes.try_emplace(row, Eigen::VectorXd::Zero(dimensions_)).first->second;
-      slope[k] = (value - below.at(row)) / (2 * kStep);
-    }
-  }
-  Overrides deviations;
-  for (const auto& [row, slope] : slopes) {
-    deviations[row] = std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
-  }
-  return deviations;
-}
-
 Space Space::holding(const Overrides& constants) const {
   Overrides all = constants;
   all.insert(constants_.begin(), constants_.end());

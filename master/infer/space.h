@@ -40,8 +40,6 @@ class Space {
   Eigen::VectorXd from(const Overrides& values) const;
   // Clamped to the table's bounds.
   Overrides values(const Eigen::VectorXd& u) const;
-  // Standard deviation of each row where the coordinates have that covariance, to first order.
-  Overrides deviations(const Eigen::VectorXd& u, const Eigen::MatrixXd& covariance) const;
   const Eigen::VectorXd& lower() const { return lower_; }
   const Eigen::VectorXd& upper() const { return upper_; }
   // Precision of the prior about the neutral value, a dimension.

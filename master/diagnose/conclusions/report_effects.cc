@@ -78,16 +78,10 @@ Estimate reported_estimate(const DiagnosisRequest& of, const Refit& refit,
   const Parameter& p = of.table()[row];
   Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
   const Deviation deviation = deviation_of(refit, row);
-  double fit_error = deviation.fitted;
-  if (fit_error > 0) e.sd = fit_error;
-  // What the base could take over is part of it where both were searched.
-  const Overrides& searched = judged.named.searched_error;
-  if (const auto wide = searched.find(row); wide != searched.end()) {
-    fit_error = std::max(fit_error, wide->second);
-  }
-  const double half =
-      kNormal90 * std::hypot(fit_error, error_beyond_fit(judged.named.study(), of.table(), row,
-                                                         estimates.at, chosen.candidate.gain));
+  if (deviation.fitted > 0) e.sd = deviation.fitted;
+  const double half = kNormal90 * std::hypot(deviation.fitted,
+                                             error_beyond_fit(judged.named.study(), of.table(), row,
+                                                              estimates.at, chosen.candidate.gain));
   e.lo = value - half;
   e.hi = value + half;
   if (!e.key.ends_with("direction")) {

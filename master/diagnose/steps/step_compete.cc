@@ -310,8 +310,8 @@ Status relinearise(const DiagnosisRequest& of, Screening* screening) {
 }
 
 // Everything from here on is about the point that explains the log.
-Status move_to(const DiagnosisRequest& of, const Found& found, const Competition& competition,
-               const Study& from, Screening* screening) {
+Status move_to(const DiagnosisRequest& of, const Found& found, const Study& from,
+               Screening* screening) {
   Explanation& named = screening->found;
   Study study = from;
   named.tuned_alone = found.base.space.values(found.base.fit.u);
@@ -321,9 +321,6 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Competition
   auto evidence = measure(of, raw.study);
   if (!evidence) return evidence.error();
   named.evidence = std::make_shared<const Evidence>(std::move(*evidence));
-  const infer::Fitter fitter(competition.forward(), competition.observations(), found.model.space);
-  named.searched_error =
-      found.model.space.deviations(found.model.fit.u, fitter.covariance(found.model.fit));
   screening->catalogue = std::make_unique<Proposals>(
       of.predictor, named.study(), std::vector<Signature>(), named.evidence->base);
   screening->explained = 0;
@@ -370,7 +367,7 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
   const std::shared_ptr<const Evidence> before = found.evidence;
   screening.found = std::move(found);
   if (moves) {
-    RETURN_IF_ERROR(move_to(of, selected, competition, before->study, &screening));
+    RETURN_IF_ERROR(move_to(of, selected, before->study, &screening));
   } else if (!screening.found.chosen.empty()) {
     if (Status s = relinearise(of, &screening); !s) return s.error();
   }

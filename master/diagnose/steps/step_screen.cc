@@ -138,7 +138,6 @@ Result<Screening> compete_from_free_base(const DiagnosisRequest& of, Explanation
   auto evidence = evidence_of(of, std::move(study));
   if (!evidence) return evidence.error();
   found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
-  found.searched_error.clear();
   return compete(of, std::move(found));
 }
 

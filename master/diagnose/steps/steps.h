@@ -70,7 +70,6 @@ struct Explanation {
   std::vector<FoundSpread> spreads;
   std::vector<ChosenEffect> chosen;
   std::optional<JointFit> estimates;  // of these, base held, beside nuisances
-  Overrides searched_error;  // standard errors with the base free, where it was searched too
 
   std::string odd_readings;  // what readings show that no effect looked for explains
   std::string odd_drives;    // the same of outlier drives in one place

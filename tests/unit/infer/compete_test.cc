@@ -119,18 +119,6 @@ TEST(InferSpace, ADirectionHasNoSeam) {
   EXPECT_LT((at(pi - 1e-6) - at(-pi + 1e-6)).norm(), 1e-4);
 }
 
-// A ring of directions: the strength is as sure as along, the direction as across it.
-TEST(InferSpace, DeviationsAreThoseOfStrengthAndDirection) {
-  const Space space(push_table(), tilt().coordinates);
-  const Overrides values = {{row("table_tilt.angle"), 0.06}, {row("table_tilt.direction"), 0.0}};
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(2, 2);
-  covariance(0, 0) = 0.01;  // along: a tenth of the size of 0.03 rad
-  covariance(1, 1) = 0.04;  // across: a fifth
-  const Overrides deviations = space.deviations(space.from(values), covariance);
-  EXPECT_NEAR(deviations.at(row("table_tilt.angle")), 0.003, 1e-6);
-  EXPECT_NEAR(deviations.at(row("table_tilt.direction")), 0.006 / 0.06, 1e-4);
-}
-
 TEST(InferSpace, AnAngleGoesRoundAndConstantsStay) {
   Coordinate c;
   c.kind = Coordinate::Kind::kAngle;
