@@ -141,17 +141,13 @@ void add_prior(const Study& study, const JointFit& fit, StepEquations* normal) {
   normal->matrix.diagonal().array() += 1e-12 * scale;
 }
 
-// Bounded for trials far out.
-double weight_of(const Study& study, Eigen::Index trial, const Eigen::VectorXd& z) {
-  if (study.ignores(trial)) return 0;
-  const double d2 = z.segment<3>(3 * trial).squaredNorm();
-  return d2 > kFarSquared ? std::sqrt(kFarSquared / d2) : 1;
-}
-
+// Bounded for trials far out; 0 of what is ignored.
 Eigen::VectorXd weights_of(const Study& study, const Eigen::VectorXd& z) {
   Eigen::VectorXd weight(z.size());
   for (Eigen::Index i = 0; i < z.size(); i += 3) {
-    weight.segment<3>(i).setConstant(weight_of(study, i / 3, z));
+    const double d2 = z.segment<3>(i).squaredNorm();
+    const double own = d2 > kFarSquared ? std::sqrt(kFarSquared / d2) : 1;
+    weight.segment<3>(i).setConstant(study.ignores(i / 3) ? 0 : own);
   }
   return weight;
 }

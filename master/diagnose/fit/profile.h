@@ -13,6 +13,6 @@ namespace gapfarm {
 // the fit goes on from there; where it rises by less than slopes say, because the valley is bent,
 // the standard error is so much wider.  Errors: the farm's.
 Result<JointFit> profiled(Predictor& predictor, const Study& study,
-                          const std::vector<EffectCandidate>& effects, JointFit fit, int rounds);
+                          const std::vector<EffectCandidate>& effects, JointFit fit);
 
 }  // namespace gapfarm

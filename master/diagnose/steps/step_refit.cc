@@ -67,7 +67,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
                      fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted,
                                  none, alone ? base_rounds : kMostRounds));
     if (!alone && count == named.chosen.size()) {
-      ASSIGN_OR_RETURN(fit, profiled(of.predictor, fitted_in, effects, std::move(fit), 2));
+      ASSIGN_OR_RETURN(fit, profiled(of.predictor, fitted_in, effects, std::move(fit)));
     }
     std::string name =
         named.as_logged ? "the tuned base, late readings put right" : "the tuned base";

@@ -76,7 +76,7 @@ struct Fitted {
     auto fit = fit_jointly(predictor, study, {effect}, start, BaseParameters::kHeld, none, kSteps);
     EXPECT_TRUE(fit.ok()) << fit.error().message;
     before = *fit;
-    auto looked = profiled(predictor, study, {effect}, std::move(*fit), kSteps);
+    auto looked = profiled(predictor, study, {effect}, std::move(*fit));
     EXPECT_TRUE(looked.ok()) << looked.error().message;
     after = *looked;
   }
