@@ -5,9 +5,10 @@
         --sizes 1.006 1.015 1.03 1.06 --per-effect 5 --nulls 8 --pairs 0 --left-out 0
     scripts/power_curves.py CHECK
 
-What is predicted comes from the check's nulls alone: the median of the sizes from which on they would
-have named each effect (`detectable_from`, 95 %). An effect of another size is named where twice its
-gain, a noncentral chi-squared, passes what 95 % of effects of that size pass. Effects of one strength.
+What is predicted of a case is what its own log says: the size from which on it names the effect
+(`detectable_from`, 95 %; where its log says nothing, the median of the check's nulls). An effect of
+another size is named where twice its gain, a noncentral chi-squared, passes what 95 % of effects of
+that size pass. Effects of one strength.
 """
 import json
 import math
@@ -19,7 +20,7 @@ from foreign_tables import wilson
 
 POWER = 0.95
 LEAST_GAIN = 9.0  # nats that a name asks for (docs/diagnosis.md), one parameter
-STUDENT = 0.849  # of twice a gain, what Student's weights leave on Gaussian noise (infer/certificate.cc)
+STUDENT = 0.966  # of twice a gain, what Student's weights leave on Gaussian noise whose scale is known (infer/certificate.cc)
 
 
 def normal_above(z):
@@ -41,15 +42,18 @@ def diagnosis(folder, case):
     return json.loads((folder / "diagnoses" / case / "diagnosis.json").read_text(encoding="utf-8"))
 
 
-def detectable(folder, cases):
-    """By effect and strength, from the nulls."""
+def detectable(folder, case):
+    """By effect and strength."""
+    return {(row["effect"], key): size for row in diagnosis(folder, case["case"])["screening"]
+            for key, size in row.get("detectable_from", {}).items()}
+
+
+def detectable_of_nulls(folder, cases):
+    """The same, the median of the nulls."""
     sizes = {}
     for case in cases:
-        if case["truth"]["kind"] != "null":
-            continue
-        for row in diagnosis(folder, case["case"])["screening"]:
-            for key, size in row.get("detectable_from", {}).items():
-                sizes.setdefault((row["effect"], key), []).append(size)
+        for at, size in detectable(folder, case).items() if case["truth"]["kind"] == "null" else ():
+            sizes.setdefault(at, []).append(size)
     return {at: statistics.median(of) for at, of in sizes.items()}
 
 
@@ -59,7 +63,7 @@ def main():
         raise SystemExit(__doc__)
     folder = pathlib.Path(sys.argv[1])
     cases = json.loads((folder / "blind_check.json").read_text(encoding="utf-8"))["cases"]
-    known, rows = detectable(folder, cases), {}
+    known, rows = detectable_of_nulls(folder, cases), {}
     for case in cases:
         truth = case["truth"]
         if truth["kind"] != "single":
@@ -70,7 +74,8 @@ def main():
             continue
         key, value = strengths[0]
         neutral = 1 if effect == "camera_aspect" else 0
-        expected = chance(abs(value - neutral) / known[effect, key])
+        own = detectable(folder, case).get((effect, key), known[effect, key])
+        expected = chance(abs(value - neutral) / own)
         said = case["said"] or {"effects": []}
         named = any(effect in [one["name"], *one["aliases"]] for one in said["effects"])
         for at in ((effect, truth["level"]), (effect, "all"), ("all", "all")):

@@ -89,15 +89,15 @@ TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   EXPECT_GT(d["effects"][0]["closed"], 0.7);
   EXPECT_LT(d["gap"]["final"], d["gap"]["tuned"]);
   // No surer than its log can be, and not much less; what it would have named, and from which size.
-  EXPECT_GT(ratio["width_over_bound"], 0.95);
-  EXPECT_LT(ratio["width_over_bound"], 3);
+  EXPECT_NEAR(ratio["width_over_bound"].get<double>(), 2, 1.05);
   EXPECT_NEAR(ratio["sd"].get<double>() / ratio["bound"].get<double>(), 1.05, 0.15);
   for (const Json& row : d["screening"]) {
     const Json& from = row["detectable_from"];
-    EXPECT_TRUE(row["effect"] != "motor_asymmetry" || from.empty());
+    if (row["effect"] == "motor_asymmetry") {
+      EXPECT_NEAR(from["ratio"].get<double>() / ratio["bound"].get<double>(), 6.1, 0.4);
+    }
     if (row["effect"] != "floor_tilt") continue;
-    EXPECT_GT(from["angle"], 0.002);
-    EXPECT_LT(from["angle"], 0.1);
+    EXPECT_NEAR(from["angle"].get<double>(), 0.051, 0.049);
   }
   // The model wrote predicts the log that it was made for.
   const Finished predicted = gapfarm_command(

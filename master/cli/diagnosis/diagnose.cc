@@ -9,6 +9,7 @@
 #include <set>
 
 #include "common/base/build_info.h"
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/cli/diagnosis/diagnose_command.h"
@@ -72,6 +73,7 @@ std::string diagnosis_summary(const Diagnosis& d) {
       d.heading_mrad.final_, d.position_mm.floor, d.heading_mrad.floor);
   std::string detectable;
   for (const Screened& s : d.screening) {
+    if (contains(d.effects, s.effect, &NamedEffect::name)) continue;
     for (std::size_t i = 0; i < s.detectable_from.size(); ++i) {
       const auto& [key, size] = s.detectable_from[i];
       detectable += (i > 0                ? ", "

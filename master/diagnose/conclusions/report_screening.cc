@@ -127,8 +127,7 @@ std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Scree
   std::vector<Screened> rows = complete_rows(of, screening, judged);
   for (Screened& row : rows) {
     const auto sizes = screening.detectable.find(row.effect);
-    if (sizes != screening.detectable.end() && !judged.named.chose(row.effect))
-      row.detectable_from = sizes->second;
+    if (sizes != screening.detectable.end()) row.detectable_from = sizes->second;
   }
   return rows;
 }

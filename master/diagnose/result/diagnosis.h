@@ -93,8 +93,8 @@ struct Screened {
   std::optional<double> held_out;      // nats a trial gained on held-out trials, when refitted
   std::optional<double> held_out_se;
   std::string note;  // why it cannot be seen in these data, or what it is an alias of
-  // Where it is not named: by parameter, how far from neutral it would have been named with 95 %
-  // power on this log, by slopes at the fit, each alone; empty: not known.
+  // By parameter, how far from neutral it is named with 95 % power on this log, by slopes at the
+  // fit, each alone; empty: not known.
   std::vector<std::pair<std::string, double>> detectable_from = {};
 };
 

@@ -48,6 +48,7 @@ class Competition {
 
 // Of what was offered beside what is explained, by its marks: of what has a place, there.
 DetectableSizes detectable_by_marks(const DiagnosisRequest& of, const Study& study,
+                                    const Competition& competition, const infer::Model& model,
                                     const Regression& explained,
                                     const std::vector<EffectCandidate>& offered,
                                     double explained_nats);
@@ -57,5 +58,9 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
                                              const infer::Model& model,
                                              const std::set<std::string>& without,
                                              double explained_nats);
+// Of what was chosen, by the model's slopes; nothing of what has a place.
+void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
+                              const Competition& competition, const infer::Model& model,
+                              const std::vector<ChosenEffect>& chosen, DetectableSizes* all);
 
 }  // namespace gapfarm::steps

@@ -1,4 +1,4 @@
-// From which size on the log would have named what it does not name.
+// From which size on the log names an effect.
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,27 @@ namespace gapfarm::steps {
 namespace {
 
 constexpr double kUnheld = 100;  // standard deviation of a coordinate without a prior, in its units
-// Student's best scale on Gaussian residuals of three dimensions, over their deviation (kTail).
-constexpr double kScaleOfGaussian = 0.848;
+
+// Of what a model leaves: its deviation over what the whitener says, and Student's scale in it.
+struct Noise {
+  double deviation = 1, scale = infer::kBestScaleOfGaussian;
+};
+
+// A scale that is kept from falling is one of a noise that is known.
+Noise noise_of(const Competition& competition, const infer::Model& model) {
+  const double likeliest = model.fit.scale / infer::kBestScaleOfGaussian;
+  const bool kept = model.fit.scale <= competition.observations().least_scale;
+  const double deviation = kept ? std::min(1.0, likeliest) : likeliest;
+  return {deviation, model.fit.scale / deviation};
+}
+
+// Columns in standard deviations of their coordinates' priors.
+Eigen::MatrixXd in_priors(Eigen::MatrixXd slopes, const Eigen::VectorXd& precision) {
+  for (Eigen::Index k = 0; k < slopes.cols(); ++k) {
+    slopes.col(k) *= precision[k] > 0 ? 1 / std::sqrt(precision[k]) : kUnheld;
+  }
+  return slopes;
+}
 
 // Of an effect's strengths how far they are from nothing, by the first of several moves that shows
 // one.  What lies on a bound was cut off there: no size within it would be named.
@@ -52,20 +71,38 @@ std::vector<Eigen::VectorXd> reaching(const Eigen::MatrixXd& information, double
   return all;
 }
 
+// From nothing, in the coordinates that the effect is searched in.
+void add_reached(const DiagnosisRequest& of, const Competition& competition,
+                 const std::string& effect, const std::vector<infer::Coordinate>& coordinates,
+                 const Eigen::MatrixXd& information, double squares, DetectableSizes* all) {
+  const infer::Space own = competition.base().only(coordinates);
+  const Eigen::VectorXd nothing = own.from({});
+  const bool polar = coordinates.front().kind == infer::Coordinate::Kind::kPolar;
+  for (const Eigen::VectorXd& c : reaching(information, squares, polar)) {
+    std::map<std::string, double> values;
+    const Eigen::VectorXd there = (nothing + c).cwiseMax(own.lower()).cwiseMin(own.upper());
+    for (const auto& [row, value] : own.values(there)) values[of.table()[row].key] = value;
+    add_sizes(of.table(), effect, values, &(*all)[effect]);
+  }
+}
+
 }  // namespace
 
 DetectableSizes detectable_by_marks(const DiagnosisRequest& of, const Study& study,
+                                    const Competition& competition, const infer::Model& model,
                                     const Regression& explained,
                                     const std::vector<EffectCandidate>& offered,
                                     double explained_nats) {
   DetectableSizes all;
+  const Noise noise = noise_of(competition, model);
   for (const EffectCandidate& candidate : offered) {
     const Signature& mark = candidate.signature;
     const Eigen::Index n = mark.columns.cols();
-    const Eigen::MatrixXd information = explained.information(mark.columns);
+    const Eigen::MatrixXd information =
+        explained.information(mark.columns) / (noise.deviation * noise.deviation);
     const double luck = std::max(0.0, mark.penalty - 0.5 * static_cast<double>(n));
-    const double squares =
-        infer::detectable_squares(least_gain_of(mark.effect, study, explained_nats) + luck, n);
+    const double squares = infer::detectable_squares(
+        least_gain_of(mark.effect, study, explained_nats) + luck, n, noise.scale);
     const bool polar = of.subject.effects->row(mark.effect).polar.has_value() && n >= 2;
     for (Eigen::VectorXd& c : reaching(information, squares, polar)) {
       if (c.size() < n) c.conservativeResizeLike(Eigen::VectorXd::Zero(n));
@@ -88,12 +125,7 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
                                              double explained_nats) {
   DetectableSizes all;
   const Eigen::Index before = model.fit.u.size();
-  Eigen::VectorXd prior(before);  // standard deviations
-  for (Eigen::Index k = 0; k < before; ++k) {
-    const double precision = model.space.prior()[k];
-    prior[k] = precision > 0 ? 1 / std::sqrt(precision) : kUnheld;
-  }
-  const double noise = model.fit.scale / kScaleOfGaussian;
+  const Noise noise = noise_of(competition, model);
   for (const infer::Hypothesis& h : competition.of_rows(without)) {
     // What has a place has no slope at nothing.
     if (!h.from_neutral) continue;
@@ -105,20 +137,38 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
     const infer::Fitter fitter(competition.forward(), competition.observations(),
                                model.space.with(h.coordinates));
     if (Status s = fitter.differentiate(&fit, before); !s) return s.error();
-    const Eigen::MatrixXd slopes = fit.slopes / noise;
+    const Eigen::MatrixXd slopes = fit.slopes / noise.deviation;
     const Eigen::MatrixXd information = infer::information(
-        slopes.rightCols(nothing.size()), slopes.leftCols(before) * prior.asDiagonal());
+        slopes.rightCols(nothing.size()), in_priors(slopes.leftCols(before), model.space.prior()));
     const double squares = infer::detectable_squares(
-        least_gain_of(h.name, study, explained_nats) + h.luck, nothing.size());
-    const bool polar = h.coordinates.front().kind == infer::Coordinate::Kind::kPolar;
-    for (const Eigen::VectorXd& c : reaching(information, squares, polar)) {
-      std::map<std::string, double> values;
-      const Eigen::VectorXd there = (nothing + c).cwiseMax(own.lower()).cwiseMin(own.upper());
-      for (const auto& [row, value] : own.values(there)) values[of.table()[row].key] = value;
-      add_sizes(of.table(), h.name, values, &all[h.name]);
-    }
+        least_gain_of(h.name, study, explained_nats) + h.luck, nothing.size(), noise.scale);
+    add_reached(of, competition, h.name, h.coordinates, information, squares, &all);
   }
   return all;
+}
+
+void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
+                              const Competition& competition, const infer::Model& model,
+                              const std::vector<ChosenEffect>& chosen, DetectableSizes* all) {
+  const Noise noise = noise_of(competition, model);
+  double explained_nats = 0;
+  for (const ChosenEffect& c : chosen) explained_nats += c.candidate.gain;
+  Eigen::Index at = competition.base().dimensions();
+  for (const ChosenEffect& c : chosen) {
+    const std::string& effect = c.candidate.signature.effect;
+    const std::vector<infer::Coordinate> coordinates = competition.coordinates_of(effect);
+    Eigen::Index own = 0;
+    for (const infer::Coordinate& coordinate : coordinates) own += coordinate.dimensions();
+    const Eigen::MatrixXd slopes = model.fit.slopes.middleCols(at, own) / noise.deviation;
+    Eigen::MatrixXd others = in_priors(model.fit.slopes / noise.deviation, model.space.prior());
+    others.middleCols(at, own).setZero();
+    at += own;
+    if (!of.subject.effects->row(effect).places.empty()) continue;
+    const double squares = infer::detectable_squares(
+        least_gain_of(effect, study, explained_nats - c.candidate.gain), own, noise.scale);
+    add_reached(of, competition, effect, coordinates, infer::information(slopes, others), squares,
+                all);
+  }
 }
 
 }  // namespace gapfarm::steps

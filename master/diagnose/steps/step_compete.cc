@@ -129,15 +129,17 @@ class Selection {
                            std::move(fit));
   }
 
-  // What the last contest was offered would have been named from some size on.
+  // What the last contest was offered would have been named from some size on, as what was chosen.
   Status measure_reach() {
-    if (marks_ != nullptr) return {};
     std::set<std::string> without;
     for (const ChosenEffect& c : found_->chosen) without.insert(c.candidate.signature.effect);
-    auto sizes =
-        detectable_by_slopes(of_, study_, competition_, found_->model, without, explained());
-    if (!sizes) return sizes.error();
-    found_->detectable = std::move(*sizes);
+    if (marks_ == nullptr) {
+      ASSIGN_OR_RETURN(
+          found_->detectable,
+          detectable_by_slopes(of_, study_, competition_, found_->model, without, explained()));
+    }
+    add_detectable_of_chosen(of_, study_, competition_, found_->model, found_->chosen,
+                             &found_->detectable);
     return {};
   }
 
@@ -162,7 +164,8 @@ class Selection {
     for (const Signature& s : first_) explained.add(s.columns);
     for (const EffectCandidate& c : chosen) explained.add(c.signature.columns);
     ASSIGN_OR_RETURN(auto marks, marks_->candidates(explained, without, chosen));
-    found_->detectable = detectable_by_marks(of_, study_, explained, marks, this->explained());
+    found_->detectable = detectable_by_marks(of_, study_, competition_, found_->model, explained,
+                                             marks, this->explained());
     std::vector<infer::Hypothesis> hypotheses;
     double best = 0;
     for (const EffectCandidate& mark : marks) {

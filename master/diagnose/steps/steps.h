@@ -95,7 +95,7 @@ struct Explanation {
   bool names_anything() const { return !chosen.empty() || !spreads.empty(); }
 };
 
-// Of each effect that was not chosen: Screened::detectable_from.
+// Of each effect: Screened::detectable_from.
 using Sizes = std::vector<std::pair<std::string, double>>;
 using DetectableSizes = std::map<std::string, Sizes>;
 
