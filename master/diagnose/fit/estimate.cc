@@ -22,7 +22,7 @@ constexpr double kSettled = 1;
 constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
 // Of a finite difference, root mean square in standard deviations a row.
 constexpr double kLeastMove = 1e-4, kMostMove = 5, kGoodMove = 0.3;
-constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
+constexpr double kFarSquared = 16;  // squared distance beyond which a trial is far out
 
 // Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
 // catalogue's bounds make a small change.
@@ -142,12 +142,13 @@ void add_prior(const Study& study, const JointFit& fit, StepEquations* normal) {
 }
 
 // Bounded for trials far out; 0 of what is ignored.
-Eigen::VectorXd weights_of(const Study& study, const Eigen::VectorXd& z) {
+Eigen::VectorXd weights_of(const Study& study, const JointFit& fit, const Eigen::VectorXd& z) {
   Eigen::VectorXd weight(z.size());
   for (Eigen::Index i = 0; i < z.size(); i += 3) {
     const double d2 = z.segment<3>(i).squaredNorm();
-    const double own = d2 > kFarSquared ? std::sqrt(kFarSquared / d2) : 1;
-    weight.segment<3>(i).setConstant(study.ignores(i / 3) ? 0 : own);
+    const double own = d2 > kFarSquared ? kFarSquared / d2 : 1;
+    const double far = fit.loss == Loss::kHuber ? std::sqrt(own) : own;
+    weight.segment<3>(i).setConstant(study.ignores(i / 3) ? 0 : far);
   }
   return weight;
 }
@@ -159,7 +160,7 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   Eigen::MatrixXd all(fit->jacobian.rows(), p + q);
   all << fit->jacobian, nuisances;
   const Eigen::VectorXd z = study.whiten(fit->residuals);
-  const Eigen::VectorXd weight = weights_of(study, z);
+  const Eigen::VectorXd weight = weights_of(study, *fit, z);
   StepEquations normal{all.transpose() * weight.asDiagonal() * all,
                        all.transpose() * weight.asDiagonal() * z};
   normal.matrix.diagonal().tail(q).array() += 1;
@@ -234,7 +235,7 @@ Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
                              const std::vector<std::size_t>& fold_of, std::size_t f) {
   const Eigen::VectorXd z = study.whiten(fit.residuals);
   const bool only = *std::max_element(fold_of.begin(), fold_of.end()) == 0;
-  Eigen::VectorXd weight = weights_of(study, z);
+  Eigen::VectorXd weight = weights_of(study, fit, z);
   for (std::size_t i = 0; i < study.size() && !only; ++i) {
     if (fold_of[i] == f) weight.segment<3>(static_cast<Eigen::Index>(3 * i)).setZero();
   }
@@ -248,7 +249,7 @@ bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); 
 
 StepEquations step_equations(const Study& study, const JointFit& fit) {
   const Eigen::VectorXd z = study.whiten(fit.residuals);
-  return equations_of(study, fit, z, weights_of(study, z));
+  return equations_of(study, fit, z, weights_of(study, fit, z));
 }
 
 void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* fit) {
@@ -260,7 +261,7 @@ void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* f
 
 double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
   const Eigen::VectorXd z = study.whiten(fit.residuals);
-  const Eigen::VectorXd weight = weights_of(study, z);
+  const Eigen::VectorXd weight = weights_of(study, fit, z);
   Eigen::MatrixXd normal = nuisances.transpose() * weight.asDiagonal() * nuisances;
   normal.diagonal().array() += 1;
   const Eigen::VectorXd taken =
@@ -270,7 +271,10 @@ double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
   for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
     if (study.ignores(i)) continue;
     const double d2 = left.segment<3>(3 * i).squaredNorm();
-    sum += d2 > kFarSquared ? 2 * std::sqrt(kFarSquared * d2) - kFarSquared : d2;
+    const double beyond = std::max(1.0, d2 / kFarSquared);
+    sum +=
+        std::min(d2, kFarSquared) +
+        kFarSquared * (fit.loss == Loss::kHuber ? 2 * (std::sqrt(beyond) - 1) : std::log(beyond));
   }
   const std::vector<BaseParameter>& base = study.base_parameters;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
@@ -319,10 +323,12 @@ std::map<std::string, double> values_at(const Study& study, const Regression& ot
 
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<EffectCandidate>& effects, const Overrides& start,
-                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds) {
+                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds,
+                             Loss loss) {
   JointFit fit;
   fit.at = start;
   fit.parameters = parameters_of(study, start, effects, base, &fit.base_parameters);
+  fit.loss = loss;
   if (Status s = predict(predictor, study, &fit); !s) return s.error();
   if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
   if (fit.parameters.empty()) return fit;

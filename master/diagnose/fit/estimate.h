@@ -18,6 +18,11 @@ struct FittedParameter {
   double bent = 1;  // by how much that is wider than slopes say (profile.h)
 };
 
+// How trials pull that are far out: all alike, which leads from afar; or the less the farther,
+// since near the end they are something else (a reading on a seam's other side), which must not
+// lead away (MM-estimates begin with the one and end with the other; Yohai 1987).
+enum class Loss { kHuber, kRedescending };
+
 struct JointFit {
   Overrides at;                             // base and effects
   std::vector<FittedParameter> parameters;  // the base's first
@@ -25,6 +30,7 @@ struct JointFit {
   std::vector<Eigen::Vector3d> residuals;  // in the fit's own predicted ends' axes
   std::vector<Pose> ends;
   Eigen::MatrixXd jacobian;  // whitened rows by parameters
+  Loss loss = Loss::kHuber;
 };
 
 enum class BaseParameters { kHeld, kFitted };
@@ -33,7 +39,8 @@ enum class BaseParameters { kHeld, kFitted };
 // prior; `nuisances` (may have no columns) take part and are thrown away.
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<EffectCandidate>& effects, const Overrides& start,
-                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds);
+                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds,
+                             Loss loss = Loss::kHuber);
 
 // Of a step that makes the misfit smaller, by a fit's derivatives, without nuisances.
 struct StepEquations {
@@ -46,8 +53,8 @@ bool goes_round(const Parameter& row);
 // Moves the parameters by so much, within their bounds; predictions and derivatives stay.
 void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* fit);
 
-// What a fit makes smaller: Huber's function of every trial's distance once the nuisances have
-// taken their part, and what that and the parameters cost under their priors.
+// What a fit makes smaller: its loss of every trial's distance once the nuisances have taken their
+// part, and what that and the parameters cost under their priors.
 double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances);
 
 // Where the seams of a fit run, searched with everything else held: the derivatives of a fit know

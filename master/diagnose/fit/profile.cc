@@ -144,7 +144,6 @@ class Profile {
 Result<JointFit> profiled(Predictor& predictor, const Study& study,
                           const std::vector<EffectCandidate>& effects, JointFit fit) {
   if (fit.parameters.size() == fit.base_parameters) return fit;
-  const Overrides before = fit.at;
   std::vector<double> bent;
   for (int moved = 0;; ++moved) {
     Profile profile(predictor, study, fit);
@@ -154,11 +153,9 @@ Result<JointFit> profiled(Predictor& predictor, const Study& study,
     if (lower == nullptr || moved == kMostMoves) break;
     fit = JointFit(*lower);
   }
-  if (fit.at != before) {
-    const Eigen::MatrixXd none(3 * study.size(), 0);
-    ASSIGN_OR_RETURN(fit, fit_jointly(predictor, study, effects, fit.at, BaseParameters::kFitted,
-                                      none, kFitRounds));
-  }
+  const Eigen::MatrixXd none(3 * study.size(), 0);
+  ASSIGN_OR_RETURN(fit, fit_jointly(predictor, study, effects, fit.at, BaseParameters::kFitted,
+                                    none, kFitRounds, Loss::kRedescending));
   for (std::size_t k = 0; k < bent.size(); ++k) {
     fit.parameters[k].bent = bent[k];
     fit.parameters[k].standard_error *= bent[k];

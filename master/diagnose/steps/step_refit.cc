@@ -87,7 +87,8 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
 Result<JointFit> estimate_beside(const DiagnosisRequest& of, const Explanation& named,
                                  const NestedFit& with_base) {
   return fit_jointly(of.predictor, named.study(), candidates_of(named.chosen), with_base.fit.at,
-                     BaseParameters::kHeld, named.evidence->nuisances, kMostRounds);
+                     BaseParameters::kHeld, named.evidence->nuisances, kMostRounds,
+                     Loss::kRedescending);
 }
 
 // Where more is left than a name allows, what the catalogue does explain is named as no cause; the
@@ -168,7 +169,7 @@ Result<Refit> with_final_fit(const DiagnosisRequest& of, Refit refit) {
   if (named.chosen.empty()) return refit;
   auto fit = fit_jointly(of.predictor, refit.nested.back().study, {}, named.estimates->at,
                          BaseParameters::kFitted, no_nuisances(named.study()),
-                         of.options.keep_base ? 0 : 2);
+                         of.options.keep_base ? 0 : 2, Loss::kRedescending);
   if (!fit && fit.error().code != ErrorCode::kSimulation) return fit.error();
   refit.final_fit = fit ? std::move(*fit) : *named.estimates;
   return refit;

@@ -79,6 +79,25 @@ TEST(FitJointly, NuisancesTakeWhatTheyMay) {
             0.1 * misfit_of(d.study, *fit, no_columns(d.study)));
 }
 
+// A fifth of the ends is read 3 cm too far ahead: they pull at the speed, until they fade.
+TEST(FitJointly, WhatIsFarOutNoLongerLeadsAwayInTheEnd) {
+  Driven d(1.08);
+  for (std::size_t i = 0; i < d.study.size(); i += 5)
+    d.study.trials[i].X_WE = d.study.trials[i].X_WE * Pose{0.03, 0, 0};
+  const auto fitted = [&](const Overrides& start, Loss loss) {
+    const auto fit = fit_jointly(d.predictor, d.study, {}, start, BaseParameters::kFitted,
+                                 no_columns(d.study), 6, loss);
+    EXPECT_TRUE(fit.ok());
+    return fit->at;
+  };
+  const auto off = [&](const Overrides& at) {
+    return std::abs(at.at(row_of(Srv1::kFullSpeed)) / d.nominal_speed / 1.08 - 1);
+  };
+  const Overrides pulled = fitted(d.study.base, Loss::kHuber);
+  EXPECT_GT(off(pulled), 1e-3);
+  EXPECT_LT(off(fitted(pulled, Loss::kRedescending)), off(pulled) / 2);
+}
+
 // Derivatives may be of coarser steps; what the fit ends with may not, and where coarser steps
 // cannot be simulated the log's own do.
 TEST(FitJointly, OnlyDerivativesAreOfCoarserSteps) {
