@@ -37,14 +37,14 @@ struct PlanOptions {
   KeepOption keep;
 };
 
-struct Place {
+struct PlannedPlace {
   double length_m, width_m;
 };
 
 // "2", "2x2" or "4x3".
-Result<Place> place_of(const std::string& text) {
+Result<PlannedPlace> place_of(const std::string& text) {
   const std::size_t x = text.find('x');
-  Place place{};
+  PlannedPlace place{};
   const auto read = [](std::string_view part, double* value) {
     const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), *value);
     return error == std::errc() && end == part.data() + part.size() && *value > 0 && *value <= 1000;
@@ -60,7 +60,7 @@ Result<Place> place_of(const std::string& text) {
 Status apply_options(PlanOptions& options, Config& config) {
   SimulateSettings& s = config.simulate;
   if (!options.place.empty()) {
-    ASSIGN_OR_RETURN(const Place place, place_of(options.place));
+    ASSIGN_OR_RETURN(const PlannedPlace place, place_of(options.place));
     if (place.length_m != place.width_m) {
       return Error{"--place is '" + options.place + "', expected a square, such as 2x2"};
     }
@@ -169,7 +169,7 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
     DriveTask task{options.source, options.out, options.picture};
     task.seed = options.settings.seed;
     if (!options.place.empty()) {
-      ASSIGN_OR_RETURN(const Place place, place_of(options.place));
+      ASSIGN_OR_RETURN(const PlannedPlace place, place_of(options.place));
       task.length_m = place.length_m;
       task.width_m = place.width_m;
     }

@@ -129,12 +129,12 @@ const WidthsAt& last_before(const std::vector<WidthsAt>& widths, double t_s) {
   return *last;
 }
 
-struct Comparison {
+struct NamedWidths {
   std::string name;  // "recorded", "random moves"
   std::vector<WidthsAt> widths;
 };
 
-std::string table_text(const DrivePlan& drive, const std::vector<Comparison>& others) {
+std::string table_text(const DrivePlan& drive, const std::vector<NamedWidths>& others) {
   const double end = drive.widths.back().t_s;
   std::vector<const WidthsAt*> columns;
   std::string text = fmt::format("{:<16}", "90 % interval");
@@ -146,7 +146,7 @@ std::string table_text(const DrivePlan& drive, const std::vector<Comparison>& ot
     if (mark < 0.9 * end) column(drive.widths, mark, "");
   }
   column(drive.widths, end, "");
-  for (const Comparison& other : others) column(other.widths, end, " " + other.name);
+  for (const NamedWidths& other : others) column(other.widths, end, " " + other.name);
   text += "\n";
   for (std::size_t k = 0; k < drive.rows.size(); ++k) {
     text += fmt::format("{:<16}", drive.rows[k].name);
@@ -169,7 +169,7 @@ Json widths_json(const std::vector<WidthsAt>& widths) {
 
 // For people, and for programs.
 std::pair<std::string, Json> result_of(const DrivePlan& drive,
-                                       const std::vector<Comparison>& others,
+                                       const std::vector<NamedWidths>& others,
                                        const plan::DriveNoise& noise,
                                        const std::vector<plan::Wanted>& wanted,
                                        const DriveTask& task) {
@@ -184,7 +184,7 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
     json["values"].push_back({{"name", row.name}, {"unit", row.unit}});
   }
   json["planned"] = widths_json(drive.widths);
-  for (const Comparison& other : others) {
+  for (const NamedWidths& other : others) {
     json[other.name] = widths_json(other.widths);
     const WidthsAt& at = last_before(other.widths, drive.widths.back().t_s);
     const auto seconds = plan::seconds_until(drive, wanted, at.widths);
@@ -272,7 +272,7 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
                          context);
   }
   ASSIGN_OR_RETURN(DrivePlan drive, plan::plan_drive(robot, noise, settings));
-  std::vector<Comparison> others;
+  std::vector<NamedWidths> others;
   settings.random = true;
   ASSIGN_OR_RETURN(const DrivePlan random, plan::plan_drive(robot, noise, settings));
   others.push_back({"random", random.widths});

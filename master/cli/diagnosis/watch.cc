@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFits = "runs.jsonl";
+constexpr const char* kFittedRuns = "runs.jsonl";
 constexpr const char* kRobotFile = "robot.toml";
 constexpr const char* kFitVersion = "1";  // of fit_run_values(): what it gave before is made anew
 constexpr double kEpoch_s = 1e8;          // times from here on are those of a calendar's clock
@@ -224,8 +224,8 @@ Result<int> run_watch(WatchCommand& command, CliContext& context) {
   for (const char* name : {"watch.json", "report.html"}) {
     const std::string path = (out / name).string();
     // What it made itself it makes again.
-    RETURN_IF_ERROR(fs::exists(out / kFits, ignored) ? command.outputs.plan_again(path)
-                                                     : command.outputs.plan(path));
+    RETURN_IF_ERROR(fs::exists(out / kFittedRuns, ignored) ? command.outputs.plan_again(path)
+                                                           : command.outputs.plan(path));
   }
   std::vector<RobotFolder> robots = find_robots(command.folder);
   if (robots.empty()) {
@@ -238,9 +238,9 @@ Result<int> run_watch(WatchCommand& command, CliContext& context) {
   read_logs(&robots, &fleet);
   fs::create_directories(out, ignored);
   context.begun = true;
-  if (Status s = fit_runs(&robots, out / kFits, context, &fleet); !s) {
+  if (Status s = fit_runs(&robots, out / kFittedRuns, context, &fleet); !s) {
     if (s.error().code != ErrorCode::kStopped) return s.error();
-    context.console.note("stopped; fits are kept in " + (out / kFits).string() +
+    context.console.note("stopped; fits are kept in " + (out / kFittedRuns).string() +
                          ", and the same command goes on");
     return kExitResumable;
   }

@@ -112,10 +112,10 @@ void add_genes(const Problem& problem, const Genome& point, const std::vector<st
   }
 }
 
-class Study {
+class Determination {
  public:
-  Study(const Problem& problem, const Genome& point, const LikelihoodOf& likelihood,
-        const DetermineSettings& settings, const StageHooks& hooks)
+  Determination(const Problem& problem, const Genome& point, const LikelihoodOf& likelihood,
+                const DetermineSettings& settings, const StageHooks& hooks)
       : problem_(problem),
         point_(point),
         likelihood_(likelihood),
@@ -293,7 +293,7 @@ class Study {
 Result<DetermineReport> determine(const Problem& problem, const Genome& point,
                                   const LikelihoodOf& likelihood, const DetermineSettings& settings,
                                   const StageHooks& hooks) {
-  return Study(problem, point, likelihood, settings, hooks).run();
+  return Determination(problem, point, likelihood, settings, hooks).run();
 }
 
 std::string determine_text(const DetermineReport& report, const ParameterTable& table) {

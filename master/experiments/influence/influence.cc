@@ -20,10 +20,10 @@ constexpr double kLeast_m = 1e-9;
 // Repeats of different uses must not share noise.
 constexpr std::uint64_t kLevelNoise = 1u << 20, kMorrisNoise = 1u << 24;
 
-class Study {
+class InfluenceStudy {
  public:
-  Study(Farm& farm, const Problem& problem, const std::vector<Gene>& genes,
-        const InfluenceSettings& settings, const StageHooks& hooks)
+  InfluenceStudy(Farm& farm, const Problem& problem, const std::vector<Gene>& genes,
+                 const InfluenceSettings& settings, const StageHooks& hooks)
       : farm_(farm),
         problem_(problem),
         genes_(genes),
@@ -295,7 +295,7 @@ Result<InfluenceReport> find_influence(Farm& farm, const Problem& problem,
                                        const std::vector<Gene>& genes,
                                        const InfluenceSettings& settings, const StageHooks& hooks) {
   if (genes.empty()) return Error{"there are no parameters to look at"};
-  return Study(farm, problem, genes, settings, hooks).run();
+  return InfluenceStudy(farm, problem, genes, settings, hooks).run();
 }
 
 std::vector<Gene> all_base_genes(const ParameterTable& table) {

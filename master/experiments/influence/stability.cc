@@ -11,7 +11,7 @@ namespace gapfarm {
 namespace {
 
 constexpr std::uint64_t kFreshNoise = 1u << 20;
-constexpr int kMostIdleGenerations = 100;
+constexpr int kMostIdleRounds = 100;
 
 std::vector<v1::Override> overrides_of(const Problem& problem, const Genome& genome) {
   std::vector<v1::Override> overrides;
@@ -90,8 +90,7 @@ Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
   hooks.began(0);
   ASSIGN_OR_RETURN(auto standard, search.spreads({{}}, 0));
   report.standard_spread = standard.front();
-  for (int idle = 0;
-       optimiser->evaluations() < settings.evaluations && idle < kMostIdleGenerations;) {
+  for (int idle = 0; optimiser->evaluations() < settings.evaluations && idle < kMostIdleRounds;) {
     std::vector<Genome> genomes = mapped(optimiser->ask(), &Candidate::genome);
     ASSIGN_OR_RETURN(const auto spreads, search.spreads(genomes, 0));
     for (std::size_t i = 0; i < genomes.size(); ++i) {

@@ -23,9 +23,9 @@ std::string text_of(sqlite3_stmt* row, int column) {
   return text == nullptr ? "" : text;
 }
 
-class Reader {
+class Db3Bag {
  public:
-  explicit Reader(const std::string& path) : path_(path), topics_(path, "a rosbag2 SQLite file") {}
+  explicit Db3Bag(const std::string& path) : path_(path), topics_(path, "a rosbag2 SQLite file") {}
 
   Result<Recording> run() {
     sqlite3* raw = nullptr;
@@ -96,6 +96,6 @@ class Reader {
 
 }  // namespace
 
-Result<Recording> read_db3(ByteSource&, const std::string& path) { return Reader(path).run(); }
+Result<Recording> read_db3(ByteSource&, const std::string& path) { return Db3Bag(path).run(); }
 
 }  // namespace gapfarm

@@ -49,9 +49,9 @@ struct Schema {
   std::string name, encoding, text;
 };
 
-class Reader {
+class McapReader {
  public:
-  Reader(ByteSource& source, const std::string& file)
+  McapReader(ByteSource& source, const std::string& file)
       : source_(source), file_(file), topics_(file, "an MCAP file") {}
 
   Result<Recording> run() {
@@ -204,7 +204,7 @@ class Reader {
 }  // namespace
 
 Result<Recording> read_mcap(ByteSource& source, const std::string& file) {
-  return Reader(source, file).run();
+  return McapReader(source, file).run();
 }
 
 }  // namespace gapfarm

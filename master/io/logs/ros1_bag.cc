@@ -9,12 +9,12 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
+constexpr std::string_view kBagMagic = "#ROSBAG V2.0\n";
 constexpr std::uint32_t kMostHeader = 1u << 24;
 constexpr std::uint32_t kMostChunk = 1u << 30;
 constexpr const char* kReindex = "copy the bag again, or mend it by rosbag reindex";
 
-enum Op : unsigned char { kMessage = 2, kChunk = 5, kConnection = 7 };
+enum BagOp : unsigned char { kBagMessage = 2, kBagChunk = 5, kConnection = 7 };
 
 template <class T>
 T number(std::string_view bytes) {
@@ -41,18 +41,18 @@ bool parse_header(std::string_view bytes, Header& to) {
   return true;
 }
 
-class Reader {
+class BagReader {
  public:
-  Reader(ByteSource& source, const std::string& file)
+  BagReader(ByteSource& source, const std::string& file)
       : source_(source), file_(file), topics_(file, "a ROS 1 bag") {}
 
   Result<Recording> run() {
     std::string bytes;
-    if (!source_.read(0, kMagic.size(), bytes) || bytes != kMagic) {
+    if (!source_.read(0, kBagMagic.size(), bytes) || bytes != kBagMagic) {
       return error(0, "other bytes than '#ROSBAG V2.0'", "a bag of version 2.0",
                    "older bags: rosbag fix");
     }
-    at_ = kMagic.size();
+    at_ = kBagMagic.size();
     while (at_ < source_.size()) {
       if (Status s = record(); !s) return s.error();
     }
@@ -86,7 +86,7 @@ class Reader {
     at_ += 4;
     if (data > source_.size() - at_) return cut(begin);
     const unsigned char op = number<unsigned char>(header["op"]);
-    const bool read = op == kChunk || op == kConnection || op == kMessage;
+    const bool read = op == kBagChunk || op == kConnection || op == kBagMessage;
     if (read) {
       if (data > kMostChunk) {
         return error(begin, "a record of " + std::to_string(data) + " bytes", "at most 1 GiB",
@@ -95,7 +95,7 @@ class Reader {
       if (!source_.read(at_, data, bytes)) return cut(begin);
     }
     at_ += data;
-    if (op == kChunk) return chunk(begin, header, bytes);
+    if (op == kBagChunk) return chunk(begin, header, bytes);
     if (read) return entry(begin, op, header, bytes);
     return {};
   }
@@ -135,7 +135,7 @@ class Reader {
   Status entry(std::uint64_t begin, unsigned char op, Header& header, std::string_view data) {
     const auto id = number<std::uint32_t>(header["conn"]);
     if (op == kConnection) return connection(begin, id, header["topic"], data);
-    if (op != kMessage) return {};
+    if (op != kBagMessage) return {};
     const auto found = connections_.find(id);
     if (found == connections_.end()) {
       return error(begin, "a message of connection " + std::to_string(id),
@@ -181,7 +181,7 @@ class Reader {
 }  // namespace
 
 Result<Recording> read_ros1_bag(ByteSource& source, const std::string& file) {
-  return Reader(source, file).run();
+  return BagReader(source, file).run();
 }
 
 }  // namespace gapfarm

@@ -7,9 +7,9 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kWidth = 860, kPlotHeight = 340, kLeft = 80, kRight = 24, kTop = 54, kAxis = 52;
+constexpr double kWidth = 860, kPlotHeight = 340, kPlotX = 80, kRight = 24, kPlotY = 54, kAxis = 52;
 constexpr double kLegendRow = 20, kLegendColumn = 260;
-constexpr const char* kFaint = "#6b6b6b";
+constexpr const char* kGrey = "#6b6b6b";
 constexpr std::array kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                  "#56b4e9", "#a06a00", "#000000"};
 
@@ -53,10 +53,10 @@ struct Axis {
 
 struct Frame {
   Axis x, y;
-  double width = kWidth - kLeft - kRight, height = kPlotHeight;
+  double width = kWidth - kPlotX - kRight, height = kPlotHeight;
 
   SvgPoint at(double px, double py) const {
-    return {kLeft + x.share(px) * width, kTop + height - y.share(py) * height};
+    return {kPlotX + x.share(px) * width, kPlotY + height - y.share(py) * height};
   }
 };
 
@@ -101,28 +101,28 @@ Frame frame_of(const LineChart& chart) {
 }
 
 void draw_axes(Svg& svg, const Frame& frame, const LineChart& chart) {
-  const SvgText middle{.size = 11, .colour = kFaint, .anchor = SvgAnchor::kMiddle};
+  const SvgText middle{.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle};
   SvgText end = middle;
   end.anchor = SvgAnchor::kEnd;
-  const double bottom = kTop + frame.height;
+  const double bottom = kPlotY + frame.height;
   const auto ys = frame.y.ticks(6), xs = frame.x.ticks(8);
   for (const double tick : ys) {
-    const double y = kTop + frame.height * (1 - frame.y.share(tick));
-    if (y < kTop || y > bottom) continue;
-    svg.line({kLeft, y}, {kWidth - kRight, y}, {.stroke = "#e9e9e9"});
-    svg.text({kLeft - 7, y + 4}, frame.y.label(tick, ys), end);
+    const double y = kPlotY + frame.height * (1 - frame.y.share(tick));
+    if (y < kPlotY || y > bottom) continue;
+    svg.line({kPlotX, y}, {kWidth - kRight, y}, {.stroke = "#e9e9e9"});
+    svg.text({kPlotX - 7, y + 4}, frame.y.label(tick, ys), end);
   }
   for (const double tick : xs) {
-    const double x = kLeft + frame.width * frame.x.share(tick);
-    if (x < kLeft || x > kWidth - kRight || (chart.whole_x && tick != std::floor(tick))) continue;
+    const double x = kPlotX + frame.width * frame.x.share(tick);
+    if (x < kPlotX || x > kWidth - kRight || (chart.whole_x && tick != std::floor(tick))) continue;
     svg.line({x, bottom}, {x, bottom + 5}, {.stroke = "#b5b5b5"});
     svg.text({x, bottom + 18}, frame.x.label(tick, xs), middle);
   }
-  svg.line({kLeft, bottom}, {kWidth - kRight, bottom}, {.stroke = "#b5b5b5"});
-  svg.text({(kLeft + kWidth - kRight) / 2, bottom + 38}, chart.x_title, middle);
+  svg.line({kPlotX, bottom}, {kWidth - kRight, bottom}, {.stroke = "#b5b5b5"});
+  svg.text({(kPlotX + kWidth - kRight) / 2, bottom + 38}, chart.x_title, middle);
   SvgText upright = middle;
   upright.rotation_deg = -90;
-  svg.text({18, kTop + frame.height / 2}, chart.y_title, upright);
+  svg.text({18, kPlotY + frame.height / 2}, chart.y_title, upright);
 }
 
 SvgStyle stroke_of(std::size_t i, double width) {
@@ -157,21 +157,21 @@ std::string series_colour(std::size_t i) { return kColours[i % kColours.size()];
 std::string line_chart(const LineChart& chart) {
   const Frame frame = frame_of(chart);
   const std::size_t entries = chart.series.size() + chart.levels.size();
-  const auto columns = static_cast<std::size_t>((kWidth - kLeft) / kLegendColumn);
+  const auto columns = static_cast<std::size_t>((kWidth - kPlotX) / kLegendColumn);
   const double legend = kLegendRow * static_cast<double>((entries + columns - 1) / columns);
-  Svg svg(kWidth, kTop + frame.height + kAxis + legend + 10);
+  Svg svg(kWidth, kPlotY + frame.height + kAxis + legend + 10);
   svg.text({18, 30}, chart.title, {.size = 16, .bold = true});
   draw_axes(svg, frame, chart);
-  svg.begin_clip({kLeft, kTop}, frame.width, frame.height);
+  svg.begin_clip({kPlotX, kPlotY}, frame.width, frame.height);
   for (std::size_t i = 0; i < chart.series.size(); ++i) {
     draw_series(svg, frame, chart.series[i], i);
   }
   const SvgStyle level_style{.stroke = "#444444", .stroke_width = 1.4, .dash = "2 3"};
   for (const ChartLevel& level : chart.levels) {
     if (!frame.y.shows(level.y)) continue;
-    const double y = kTop + frame.height * (1 - frame.y.share(level.y));
-    svg.line({kLeft, y}, {kWidth - kRight, y}, level_style);
-    if (y > kTop && y < kTop + frame.height) {
+    const double y = kPlotY + frame.height * (1 - frame.y.share(level.y));
+    svg.line({kPlotX, y}, {kWidth - kRight, y}, level_style);
+    if (y > kPlotY && y < kPlotY + frame.height) {
       svg.text({kWidth - kRight - 4, y - 4}, level.name,
                {.size = 11, .colour = "#444444", .anchor = SvgAnchor::kEnd});
     }
@@ -179,8 +179,8 @@ std::string line_chart(const LineChart& chart) {
   svg.end_clip();
   for (std::size_t i = 0; i < entries; ++i) {
     const SvgPoint place{
-        kLeft + kLegendColumn * static_cast<double>(i % columns),
-        kTop + frame.height + kAxis + 8 + kLegendRow * static_cast<double>(i / columns)};
+        kPlotX + kLegendColumn * static_cast<double>(i % columns),
+        kPlotY + frame.height + kAxis + 8 + kLegendRow * static_cast<double>(i / columns)};
     const bool is_series = i < chart.series.size();
     svg.line(place, {place.x + 26, place.y}, is_series ? stroke_of(i, 3) : level_style);
     svg.text({place.x + 33, place.y + 4},
@@ -236,18 +236,18 @@ std::string bar_chart(const std::string& title, const std::string& x_title,
   axis.high += std::max(0.03 * (axis.high - axis.low), 1e-9);
   const double width = kWidth - kNames - kRight;
   const double height = kRow * static_cast<double>(bars.size());
-  Svg svg(kWidth, kTop + height + kAxis);
+  Svg svg(kWidth, kPlotY + height + kAxis);
   svg.text({18, 30}, title, {.size = 16, .bold = true});
   const auto x_of = [&](double value) { return kNames + width * axis.share(value); };
   const auto ticks = axis.ticks(7);
   for (const double tick : ticks) {
-    svg.line({x_of(tick), kTop}, {x_of(tick), kTop + height}, {.stroke = "#e9e9e9"});
-    svg.text({x_of(tick), kTop + height + 18}, axis.label(tick, ticks),
-             {.size = 11, .colour = kFaint, .anchor = SvgAnchor::kMiddle});
+    svg.line({x_of(tick), kPlotY}, {x_of(tick), kPlotY + height}, {.stroke = "#e9e9e9"});
+    svg.text({x_of(tick), kPlotY + height + 18}, axis.label(tick, ticks),
+             {.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle});
   }
   for (std::size_t i = 0; i < bars.size(); ++i) {
     const ChartBar& bar = bars[i];
-    const double y = kTop + kRow * (static_cast<double>(i) + 0.5);
+    const double y = kPlotY + kRow * (static_cast<double>(i) + 0.5);
     svg.text({kNames - 8, y + 4}, bar.name, {.size = 12, .anchor = SvgAnchor::kEnd});
     svg.rectangle({x_of(0), y - 7}, std::max(0.0, x_of(bar.value) - x_of(0)), 14,
                   {.fill = bar.strong ? "#0072b2" : "#ffffff", .stroke = "#0072b2"});
@@ -261,12 +261,12 @@ std::string bar_chart(const std::string& title, const std::string& x_title,
     }
   }
   if (mark) {
-    svg.line({x_of(*mark), kTop - 6}, {x_of(*mark), kTop + height},
+    svg.line({x_of(*mark), kPlotY - 6}, {x_of(*mark), kPlotY + height},
              {.stroke = "#d55e00", .stroke_width = 1.6, .dash = "5 4"});
-    svg.text({x_of(*mark) + 4, kTop - 6}, mark_name, {.size = 11, .colour = "#d55e00"});
+    svg.text({x_of(*mark) + 4, kPlotY - 6}, mark_name, {.size = 11, .colour = "#d55e00"});
   }
-  svg.text({kNames + width / 2, kTop + height + 40}, x_title,
-           {.size = 11, .colour = kFaint, .anchor = SvgAnchor::kMiddle});
+  svg.text({kNames + width / 2, kPlotY + height + 40}, x_title,
+           {.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle});
   return svg.finish();
 }
 

@@ -50,7 +50,7 @@ constexpr double kTop = 46;     // for the panel's title and its note
 constexpr double kBottom = 50;  // for the x axis
 constexpr double kGap = 14;
 constexpr double kHeader = 88;  // titles and legend
-constexpr double kMargin = 18;
+constexpr double kOuterMargin = 18;
 constexpr double kLegendWidth = 664;
 // A letter of the fonts that browsers take for the title's 19 px in bold, and the subtitle's.
 constexpr double kTitleWidth = 10.4;
@@ -284,16 +284,16 @@ std::string pose_picture(const std::vector<PosePanel>& panels, const std::string
   // Wide enough for the legend and the titles even with one panel.
   const double text_style = std::max(kTitleWidth * static_cast<double>(title.size()),
                                      kSubtitleWidth * static_cast<double>(subtitle.size()));
-  const double width =
-      2 * kMargin + std::max({static_cast<double>(columns) * cell_width, kLegendWidth, text_style});
-  Svg svg(width, kHeader + static_cast<double>(rows) * cell_height + kMargin);
-  svg.text({kMargin, 30}, title, {.size = 19, .colour = kInk, .bold = true});
-  svg.text({kMargin, 50}, subtitle, {.size = 12.5, .colour = kFaint});
-  if (!panels.empty()) draw_legend(svg, panels, {kMargin, 74});
+  const double width = 2 * kOuterMargin + std::max({static_cast<double>(columns) * cell_width,
+                                                    kLegendWidth, text_style});
+  Svg svg(width, kHeader + static_cast<double>(rows) * cell_height + kOuterMargin);
+  svg.text({kOuterMargin, 30}, title, {.size = 19, .colour = kInk, .bold = true});
+  svg.text({kOuterMargin, 50}, subtitle, {.size = 12.5, .colour = kFaint});
+  if (!panels.empty()) draw_legend(svg, panels, {kOuterMargin, 74});
   for (std::size_t i = 0; i < panels.size(); ++i) {
     const std::size_t row = i / columns;
     draw_panel(svg, panels[i],
-               {kMargin + kLeft + static_cast<double>(i % columns) * cell_width,
+               {kOuterMargin + kLeft + static_cast<double>(i % columns) * cell_width,
                 kHeader + kTop + static_cast<double>(row) * cell_height});
   }
   return svg.finish();
