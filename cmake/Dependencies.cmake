@@ -30,3 +30,15 @@ if(GAPFARM_PYTHON)
   # Debian's own: others on the PATH do not see its packages.
   find_program(DEBIAN_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
 endif()
+
+# What gapfarm_share takes from.
+if(GAPFARM_SHARE)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/headers.cc CONTENT "")
+  foreach(shared gapfarm_headers gapfarm_headers_cold)
+    add_library(${shared} OBJECT ${PROJECT_BINARY_DIR}/headers.cc)
+    target_link_libraries(${shared} PRIVATE Eigen3::Eigen)
+    target_compile_options(${shared} PRIVATE -fpch-preprocess)
+    target_precompile_headers(${shared} PRIVATE ${GAPFARM_COMMON_HEADERS} <Eigen/Dense>)
+  endforeach()
+  gapfarm_cold(gapfarm_headers_cold)
+endif()

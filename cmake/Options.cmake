@@ -31,7 +31,8 @@ endif()
 # From the compiler's list of headers, where ccache would run the preprocessor over each source first.
 find_program(CCACHE ccache)
 if(CCACHE AND GAPFARM_CCACHE)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_DEPEND=1 ${CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_DEPEND=1
+      CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
 endif()
 
 # gapfarm_linked(TARGET OUT): this project's libraries that TARGET links, itself too if it is one.
@@ -57,13 +58,30 @@ function(gapfarm_linked target out)
   set(${out} ${found} PARENT_SCOPE)
 endfunction()
 
+set(GAPFARM_COMMON_HEADERS
+  <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map> <memory>
+  <optional> <set> <span> <sstream> <string> <string_view> <utility> <vector>)
+
 # gapfarm_precompile(TARGET [HEADER...]): parses the standard library's headers and these once a
 # target, where GAPFARM_PRECOMPILE asks for it.
 function(gapfarm_precompile name)
   if(GAPFARM_PRECOMPILE)
-    target_precompile_headers(${name} PRIVATE
-      <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map>
-      <memory> <optional> <span> <sstream> <string> <string_view> <utility> <vector> ${ARGN})
+    target_precompile_headers(${name} PRIVATE ${GAPFARM_COMMON_HEADERS} ${ARGN})
+    target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache
+  endif()
+endfunction()
+
+# gapfarm_share(TARGET): takes the standard library's headers and Eigen's from what was parsed once
+# for all libraries (cmake/Dependencies.cmake), where GAPFARM_SHARE asks for it.  gcc keeps its
+# options with them: one for each optimisation.
+function(gapfarm_share name)
+  if(GAPFARM_SHARE)
+    get_target_property(options ${name} COMPILE_OPTIONS)
+    if("${options}" MATCHES "-O1")
+      target_precompile_headers(${name} REUSE_FROM gapfarm_headers_cold)
+    else()
+      target_precompile_headers(${name} REUSE_FROM gapfarm_headers)
+    endif()
     target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache
   endif()
 endfunction()
@@ -126,6 +144,7 @@ function(gapfarm_library name)
     if(ARG_COLD)
       gapfarm_cold(${name})
     endif()
+    gapfarm_share(${name})
     set_target_properties(${name} PROPERTIES GAPFARM_SEPARATE "${ARG_SEPARATE}")
   else()
     add_library(${name} INTERFACE)
