@@ -1,5 +1,6 @@
 #include "common/parameters/racquetball.h"
 
+#include "common/base/constants.h"
 #include "common/parameters/rows.h"
 
 namespace gapfarm {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "common/base/constants.h"
 #include "common/base/text.h"
 #include "common/parameters/rows.h"
 #include "common/parameters/srv1_robot_file.h"

@@ -13,6 +13,7 @@
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
+#include "master/farm/planned_trials.h"
 #include "master/report/figures/effect_figure.h"
 
 namespace gapfarm {

@@ -17,6 +17,7 @@
 #include "common/trials/text/csv.h"
 #include "master/cli/models/parameter_options.h"
 #include "master/command/inputs.h"
+#include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 
 namespace gapfarm {

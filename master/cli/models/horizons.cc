@@ -2,12 +2,14 @@
 #include "master/ground/horizons.h"
 
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/recordings/read.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
+#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/ground/paths.h"
 

@@ -4,6 +4,7 @@
 
 #include "common/base/try.h"
 #include "common/config/model.h"
+#include "master/farm/planned_trials.h"
 
 namespace gapfarm {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/score/kinematic_start.h"
 
 namespace gapfarm {
 namespace {
