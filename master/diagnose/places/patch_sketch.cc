@@ -23,8 +23,8 @@ constexpr double kApart_m = 0.08;  // discs closer than this, in all of x, y and
 constexpr Eigen::Index kFewestMarked = 30;  // rows, three a trial
 constexpr double kMostSteps = 20;           // of the grid, along each axis
 constexpr std::size_t kClimbs = 12;
-constexpr double kLeastStretch = 0.08;
-constexpr double kMostStretch = 2.8;
+constexpr double kLeastPatchRatio = 0.08;
+constexpr double kMostPatchRatio = 2.8;
 
 // Which contacts lie in the patch, a bit each.
 unsigned inside(const std::array<Eigen::Vector2d, 4>& contacts, const Patch& patch) {
@@ -257,7 +257,7 @@ double PatchSketch::fitted_ratio(const Regression& explained, const Patch& patch
   const Eigen::VectorXd mark = column(patch);
   const double own = explained.own_squares(mark);
   const double share = own > 0 ? mark.dot(explained.left()) / own : 0;
-  return std::clamp(std::pow(patch[3], share), kLeastStretch, kMostStretch);
+  return std::clamp(std::pow(patch[3], share), kLeastPatchRatio, kMostPatchRatio);
 }
 
 std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained,
