@@ -179,8 +179,7 @@ infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
   h.name = mark.signature.effect;
   h.coordinates = coordinates_of(h.name);
   h.from_neutral = false;
-  double dimensions = 0;
-  for (const Coordinate& c : h.coordinates) dimensions += static_cast<double>(c.dimensions());
+  const auto dimensions = static_cast<double>(base_.only(h.coordinates).dimensions());
   h.luck = std::max(0.0, mark.signature.penalty - dimensions / 2);
   infer::Start& start = h.starts.emplace_back();
   for (const auto& [key, value] : start_values(study_, explained, mark.signature)) {

@@ -157,8 +157,7 @@ void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
   for (const ChosenEffect& c : chosen) {
     const std::string& effect = c.candidate.signature.effect;
     const std::vector<infer::Coordinate> coordinates = competition.coordinates_of(effect);
-    Eigen::Index own = 0;
-    for (const infer::Coordinate& coordinate : coordinates) own += coordinate.dimensions();
+    const Eigen::Index own = competition.base().only(coordinates).dimensions();
     const Eigen::MatrixXd slopes = model.fit.slopes.middleCols(at, own) / noise.deviation;
     Eigen::MatrixXd others = in_priors(model.fit.slopes / noise.deviation, model.space.prior());
     others.middleCols(at, own).setZero();

@@ -195,8 +195,8 @@ class Selection {
     Eigen::Index at = competition_.base().dimensions();
     for (std::size_t k = 0; k < found_->chosen.size(); ++k) {
       Signature& mark = found_->chosen[k].candidate.signature;
-      Eigen::Index own = 0;
-      for (const auto& c : competition_.coordinates_of(mark.effect)) own += c.dimensions();
+      const Eigen::Index own =
+          competition_.base().only(competition_.coordinates_of(mark.effect)).dimensions();
       mark.columns = competition_.in_all_trials(found_->model.fit.slopes.middleCols(at, own));
       if (of_.subject.effects->row(mark.effect).by_contact) {
         mark.columns = split_by_kind(study_, mark.columns);
