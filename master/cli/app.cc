@@ -13,6 +13,7 @@
 #include "common/base/suggest.h"
 #include "common/process/stop.h"
 #include "common/usage/usage.h"
+#include "master/cli/run_arguments.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 

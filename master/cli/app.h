@@ -22,7 +22,4 @@ std::unique_ptr<Program> make_program();
 // CLI::ParseError.
 void parse_arguments(Program& program, std::vector<std::string> arguments);
 
-// Does what a command line asks, the program's name omitted.  Returns the exit code.
-int run_arguments(const std::vector<std::string>& arguments);
-
 }  // namespace gapfarm
