@@ -20,7 +20,9 @@ from foreign_tables import wilson
 
 POWER = 0.95
 LEAST_GAIN = 9.0  # nats that a name asks for (docs/diagnosis.md), one parameter
-STUDENT = 0.966  # of twice a gain, what Student's weights leave on Gaussian noise whose scale is known (infer/certificate.cc)
+# Of twice a gain, what Student's weights leave on Gaussian noise whose scale is known
+# (infer/certificate.cc).
+STUDENT = 0.966
 
 
 def normal_above(z):
