@@ -38,7 +38,10 @@ if(GAPFARM_SHARE)
     add_library(${shared} OBJECT ${PROJECT_BINARY_DIR}/headers.cc)
     target_link_libraries(${shared} PRIVATE Eigen3::Eigen)
     target_compile_options(${shared} PRIVATE -fpch-preprocess)
-    target_precompile_headers(${shared} PRIVATE ${GAPFARM_COMMON_HEADERS} <Eigen/Dense>)
+    target_precompile_headers(${shared} PRIVATE
+      <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map>
+      <memory> <optional> <set> <span> <sstream> <string> <string_view> <utility> <vector>
+      <Eigen/Dense>)
   endforeach()
   gapfarm_cold(gapfarm_headers_cold)
 endif()

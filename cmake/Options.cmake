@@ -61,19 +61,6 @@ function(gapfarm_linked target out)
   set(${out} ${found} PARENT_SCOPE)
 endfunction()
 
-set(GAPFARM_COMMON_HEADERS
-  <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map> <memory>
-  <optional> <set> <span> <sstream> <string> <string_view> <utility> <vector>)
-
-# gapfarm_precompile(TARGET [HEADER...]): parses the standard library's headers and these once a
-# target, where GAPFARM_PRECOMPILE asks for it.
-function(gapfarm_precompile name)
-  if(GAPFARM_PRECOMPILE)
-    target_precompile_headers(${name} PRIVATE ${GAPFARM_COMMON_HEADERS} ${ARGN})
-    target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache
-  endif()
-endfunction()
-
 # gapfarm_share(TARGET): takes the standard library's headers and Eigen's from what was parsed once
 # for all libraries (cmake/Dependencies.cmake), where GAPFARM_SHARE asks for it.  gcc keeps its
 # options with them: one for each optimisation.
@@ -130,11 +117,11 @@ function(gapfarm_texts header)
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${folder}/${header} CONTENT "@text@" @ONLY)
 endfunction()
 
-# gapfarm_library(NAME [COLD] [PARTS n] SOURCES a.cc b.cc DEPS x y [SEPARATE c.cc...]
-#                 [PRECOMPILE <header>...]): one library a folder, sources listed by hand; SEPARATE
-# ones define names that others define too; PARTS, where one compilation would be too long.
+# gapfarm_library(NAME [COLD] [PARTS n] SOURCES a.cc b.cc DEPS x y [SEPARATE c.cc...]): one library a
+# folder, sources listed by hand; SEPARATE ones define names that others define too; PARTS, where one
+# compilation would be too long.
 function(gapfarm_library name)
-  cmake_parse_arguments(ARG "COLD" "PARTS" "SOURCES;SEPARATE;DEPS;PRECOMPILE" ${ARGN})
+  cmake_parse_arguments(ARG "COLD" "PARTS" "SOURCES;SEPARATE;DEPS" ${ARGN})
   if(NOT ARG_PARTS)
     set(ARG_PARTS 1)
   endif()
@@ -142,7 +129,6 @@ function(gapfarm_library name)
     add_library(${name} STATIC ${ARG_SOURCES} ${ARG_SEPARATE})
     target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
     target_link_libraries(${name} PUBLIC ${ARG_DEPS})
-    gapfarm_precompile(${name} ${ARG_PRECOMPILE})
     gapfarm_join(${name} ${ARG_PARTS} ${ARG_SEPARATE})
     if(ARG_COLD)
       gapfarm_cold(${name})
