@@ -21,6 +21,8 @@ function start(...args) {
   return child;
 }
 
+const sleep = (ms) => new Promise((done) => { setTimeout(done, ms); });
+
 // What holds at last.  A page may load itself again meanwhile, when it gets other sections.
 async function until(page, expression, words, ms = 90_000) {
   for (const from = performance.now(); performance.now() - from < ms;) {
@@ -37,7 +39,7 @@ async function until(page, expression, words, ms = 90_000) {
 async function served(url) {
   for (const from = performance.now(); performance.now() - from < 90_000;) {
     if ((await fetch(url)).ok) break;
-    await new Promise((done) => { setTimeout(done, 100); });
+    await sleep(100);
   }
   return url;
 }
@@ -144,27 +146,36 @@ async function withoutEvents(url, resume) {
   await page.close();
 }
 
+// Moments at a time, held up in between, until the server's page says so: stages are there to be seen
+// however fast the machine is.
+async function goOnUntil(command, url, pattern) {
+  for (const from = performance.now(); performance.now() - from < 200_000;) {
+    command.kill("SIGSTOP");
+    const answer = await fetch(url);
+    if (answer.ok && pattern.test(await answer.text())) return;
+    if (!answer.ok) await sleep(500);  // until the server looks around again
+    command.kill("SIGCONT");
+    await sleep(30);
+  }
+  check(false, `the page of ${command.spawnargs.join(" ")} never said ${pattern}`);
+}
+
 // From its first stage to its report.
 async function diagnosed(view) {
   writeFileSync(join(folder, "d.toml"), DIAGNOSED);
   const made = start("simulate", "d.toml", "--trials", "60", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
   check((await made.ended) === 0, `nothing to diagnose: ${made.said}`);
   const diagnosis = start("diagnose", "d.toml", "--trials", "d.csv", "--out", "d", "--workers", "1");
-  // Held up until the page is open and again and again from then on, so that its stages are there to
-  // be seen however fast the machine is.
-  while (!existsSync(join(folder, "d", "simulations.sqlite"))) await new Promise((go) => setTimeout(go, 10));
-  diagnosis.kill("SIGSTOP");
-  const page = await open(await served(view("d")), { may });
-  const hold = () => { diagnosis.kill("SIGCONT"); setTimeout(() => diagnosis.kill("SIGSTOP"), 500); };
-  const holding = setInterval(hold, 1000);
-  const stage = `document.querySelector("#tiles")?.innerText || ""`;
-  await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work", 200_000);
+  while (!existsSync(join(folder, "d", "simulations.sqlite"))) await sleep(10);
+  await goOnUntil(diagnosis, view("d"), /<strong>[1-9] of 6/);
+  const page = await open(view("d"), { may });
   // What was found is there before the report is, stage by stage.
-  const told = (about) => `[...document.querySelectorAll("#found-list h4")].some((h) => h.textContent === "${about}")`;
-  await until(page, told("the base model"), "what the first stage found is told", 200_000);
-  await until(page, told("what the catalogue offers"), "what the catalogue offers is told", 200_000);
-  clearInterval(holding);
-  setTimeout(() => diagnosis.kill("SIGCONT"), 600);
+  for (const about of ["the base model", "what the catalogue offers"]) {
+    await goOnUntil(diagnosis, view("d"), RegExp(`<h4>${about}</h4>`));
+    await until(page, `[...document.querySelectorAll("#found-list h4")].some((h) => h.textContent === "${about}")`, `it is told of ${about}`);
+  }
+  check(/[1-9] of 6/.test(await page.run(`document.querySelector("#tiles").innerText`)), "no stage of a diagnosis is shown");
+  diagnosis.kill("SIGCONT");
   await page.picture("serve-diagnosis-live");
   await until(page, `document.getElementById("shrinkage") || document.getElementById("screening")`, "the diagnosis becomes its report", 400_000);
   check((await diagnosis.ended) === 0, `the diagnosis did not end well: ${diagnosis.said}`);
