@@ -20,9 +20,7 @@ from foreign_tables import wilson
 
 POWER = 0.95
 LEAST_GAIN = 9.0  # nats that a name asks for (docs/diagnosis.md), one parameter
-# Of twice a gain, what Student's weights leave on Gaussian noise whose scale is known
-# (infer/certificate.cc).
-STUDENT = 0.966
+STUDENT = 0.849  # of twice a gain, what Student's weights leave on Gaussian noise (infer/certificate.cc)
 
 
 def normal_above(z):

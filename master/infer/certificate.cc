@@ -5,33 +5,14 @@
 
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
-#include "master/infer/settings.h"
 
 namespace gapfarm::infer {
 namespace {
 
-// Of Student's log density (kTail) over Gaussian residuals of three dimensions, in those of the
-// Gaussian's own.
-struct OnGaussian {
-  double curvature = 0;       // mean
-  double slope_variance = 0;  // of one dimension
-};
-
-// By the midpoints of equal steps of the residuals' length.
-OnGaussian student_on_gaussian(double scale) {
-  constexpr double kFarthest = 8, kStep = 0.01;  // standard deviations
-  OnGaussian sums;
-  double weights = 0;
-  for (double length = kStep / 2; length < kFarthest; length += kStep) {
-    const double squares = length * length, weight = squares * std::exp(-squares / 2);
-    const double slope = (kTail + 3) / (kTail * scale * scale + squares);
-    sums.curvature += weight * (slope - 2 * slope * slope * squares / 3 / (kTail + 3));
-    sums.slope_variance += weight * slope * slope * squares / 3;
-    weights += weight;
-  }
-  return {sums.curvature / weights, sums.slope_variance / weights};
-}
-
+// Of Student's log density (kTail) at its best scale, over Gaussian residuals of three dimensions:
+// mean curvature, and variance of a slope, in those of the Gaussian's own.  By simulation of
+// 200,000 of them.
+constexpr double kCurvature = 0.998, kSlopeVariance = 1.175;
 constexpr double kNothing = 1e-9;  // of the greatest information: none
 
 }  // namespace
@@ -75,12 +56,11 @@ double noncentrality_for(double power, double threshold, double freedom) {
   return noncentrality_of(freedom, threshold, power);
 }
 
-double detectable_squares(double least_gain, Eigen::Index parameters, double scale) {
+double detectable_squares(double least_gain, Eigen::Index parameters) {
   const auto freedom = static_cast<double>(parameters);
-  const OnGaussian student = student_on_gaussian(scale);
-  const double shrinks = student.curvature / student.slope_variance;
+  const double shrinks = kCurvature / kSlopeVariance;
   return noncentrality_for(kDetectablePower, 2 * (least_gain + freedom) * shrinks, freedom) /
-         (student.curvature * shrinks);
+         (kCurvature * shrinks);
 }
 
 }  // namespace gapfarm::infer

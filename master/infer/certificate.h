@@ -31,10 +31,8 @@ inline constexpr double kDetectablePower = 0.95;
 
 // Squared size, in standard deviations, of parameters that a contest (compete()) names with that
 // chance where their gain is asked to be so many nats, held out: twice the gain in sample is a
-// chi-squared about it, of which Student's weights at that scale, in standard deviations, leave a
-// known share on Gaussian noise, and each parameter costs a nat when other observations are
-// predicted (Stone 1977).
-double detectable_squares(double least_gain, Eigen::Index parameters,
-                          double scale = kBestScaleOfGaussian);
+// chi-squared about it, of which Student's weights leave a known share on Gaussian noise, and each
+// parameter costs a nat when other observations are predicted (Stone 1977).
+double detectable_squares(double least_gain, Eigen::Index parameters);
 
 }  // namespace gapfarm::infer

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "master/diagnose/conclusions/findings.h"
+#include "master/infer/certificate.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -110,8 +111,8 @@ Competition::Competition(const DiagnosisRequest& of, const Study& study, const E
   // noise is known from what no smooth function explains.
   if (!of.subject.base_moves) {
     all.columns = columns_of(evidence, first);
-    all.least_scale = std::sqrt(kLeastLeftoverScale);
-    all.most_scale = std::sqrt(kMostLeftoverScale);
+    all.least_scale = infer::kBestScaleOfGaussian * std::sqrt(kLeastLeftoverScale);
+    all.most_scale = infer::kBestScaleOfGaussian * std::sqrt(kMostLeftoverScale);
   }
   base_ = base_space(study, base, all.columns.cols());
   scope_ = infer::scope_of(all_, all, not_ignored(study));

@@ -48,8 +48,7 @@ class Competition {
 
 // Of what was offered beside what is explained, by its marks: of what has a place, there.
 DetectableSizes detectable_by_marks(const DiagnosisRequest& of, const Study& study,
-                                    const Competition& competition, const infer::Model& model,
-                                    const Regression& explained,
+                                    const infer::Model& model, const Regression& explained,
                                     const std::vector<EffectCandidate>& offered,
                                     double explained_nats);
 // Of what is searched, by slopes at a model; nothing of what has a place.

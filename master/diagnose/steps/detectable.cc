@@ -12,18 +12,8 @@ namespace {
 
 constexpr double kUnheld = 100;  // standard deviation of a coordinate without a prior, in its units
 
-// Of what a model leaves: its deviation over what the whitener says, and Student's scale in it.
-struct Noise {
-  double deviation = 1, scale = infer::kBestScaleOfGaussian;
-};
-
-// A scale that is kept from falling is one of a noise that is known.
-Noise noise_of(const Competition& competition, const infer::Model& model) {
-  const double likeliest = model.fit.scale / infer::kBestScaleOfGaussian;
-  const bool kept = model.fit.scale <= competition.observations().least_scale;
-  const double deviation = kept ? std::min(1.0, likeliest) : likeliest;
-  return {deviation, model.fit.scale / deviation};
-}
+// Standard deviation of what a model leaves, over what the whitener says.
+double noise_of(const infer::Model& model) { return model.fit.scale / infer::kBestScaleOfGaussian; }
 
 // Columns in standard deviations of their coordinates' priors.
 Eigen::MatrixXd in_priors(Eigen::MatrixXd slopes, const Eigen::VectorXd& precision) {
@@ -89,20 +79,18 @@ void add_reached(const DiagnosisRequest& of, const Competition& competition,
 }  // namespace
 
 DetectableSizes detectable_by_marks(const DiagnosisRequest& of, const Study& study,
-                                    const Competition& competition, const infer::Model& model,
-                                    const Regression& explained,
+                                    const infer::Model& model, const Regression& explained,
                                     const std::vector<EffectCandidate>& offered,
                                     double explained_nats) {
   DetectableSizes all;
-  const Noise noise = noise_of(competition, model);
+  const double noise = noise_of(model);
   for (const EffectCandidate& candidate : offered) {
     const Signature& mark = candidate.signature;
     const Eigen::Index n = mark.columns.cols();
-    const Eigen::MatrixXd information =
-        explained.information(mark.columns) / (noise.deviation * noise.deviation);
+    const Eigen::MatrixXd information = explained.information(mark.columns) / (noise * noise);
     const double luck = std::max(0.0, mark.penalty - 0.5 * static_cast<double>(n));
-    const double squares = infer::detectable_squares(
-        least_gain_of(mark.effect, study, explained_nats) + luck, n, noise.scale);
+    const double squares =
+        infer::detectable_squares(least_gain_of(mark.effect, study, explained_nats) + luck, n);
     const bool polar = of.subject.effects->row(mark.effect).polar.has_value() && n >= 2;
     for (Eigen::VectorXd& c : reaching(information, squares, polar)) {
       if (c.size() < n) c.conservativeResizeLike(Eigen::VectorXd::Zero(n));
@@ -125,7 +113,7 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
                                              double explained_nats) {
   DetectableSizes all;
   const Eigen::Index before = model.fit.u.size();
-  const Noise noise = noise_of(competition, model);
+  const double noise = noise_of(model);
   for (const infer::Hypothesis& h : competition.of_rows(without)) {
     // What has a place has no slope at nothing.
     if (!h.from_neutral) continue;
@@ -137,11 +125,11 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
     const infer::Fitter fitter(competition.forward(), competition.observations(),
                                model.space.with(h.coordinates));
     if (Status s = fitter.differentiate(&fit, before); !s) return s.error();
-    const Eigen::MatrixXd slopes = fit.slopes / noise.deviation;
+    const Eigen::MatrixXd slopes = fit.slopes / noise;
     const Eigen::MatrixXd information = infer::information(
         slopes.rightCols(nothing.size()), in_priors(slopes.leftCols(before), model.space.prior()));
     const double squares = infer::detectable_squares(
-        least_gain_of(h.name, study, explained_nats) + h.luck, nothing.size(), noise.scale);
+        least_gain_of(h.name, study, explained_nats) + h.luck, nothing.size());
     add_reached(of, competition, h.name, h.coordinates, information, squares, &all);
   }
   return all;
@@ -150,7 +138,7 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
 void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
                               const Competition& competition, const infer::Model& model,
                               const std::vector<ChosenEffect>& chosen, DetectableSizes* all) {
-  const Noise noise = noise_of(competition, model);
+  const double noise = noise_of(model);
   double explained_nats = 0;
   for (const ChosenEffect& c : chosen) explained_nats += c.candidate.gain;
   Eigen::Index at = competition.base().dimensions();
@@ -158,13 +146,13 @@ void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
     const std::string& effect = c.candidate.signature.effect;
     const std::vector<infer::Coordinate> coordinates = competition.coordinates_of(effect);
     const Eigen::Index own = competition.base().only(coordinates).dimensions();
-    const Eigen::MatrixXd slopes = model.fit.slopes.middleCols(at, own) / noise.deviation;
-    Eigen::MatrixXd others = in_priors(model.fit.slopes / noise.deviation, model.space.prior());
+    const Eigen::MatrixXd slopes = model.fit.slopes.middleCols(at, own) / noise;
+    Eigen::MatrixXd others = in_priors(model.fit.slopes / noise, model.space.prior());
     others.middleCols(at, own).setZero();
     at += own;
     if (!of.subject.effects->row(effect).places.empty()) continue;
     const double squares = infer::detectable_squares(
-        least_gain_of(effect, study, explained_nats - c.candidate.gain), own, noise.scale);
+        least_gain_of(effect, study, explained_nats - c.candidate.gain), own);
     add_reached(of, competition, effect, coordinates, infer::information(slopes, others), squares,
                 all);
   }

@@ -164,8 +164,8 @@ class Selection {
     for (const Signature& s : first_) explained.add(s.columns);
     for (const EffectCandidate& c : chosen) explained.add(c.signature.columns);
     ASSIGN_OR_RETURN(auto marks, marks_->candidates(explained, without, chosen));
-    found_->detectable = detectable_by_marks(of_, study_, competition_, found_->model, explained,
-                                             marks, this->explained());
+    found_->detectable =
+        detectable_by_marks(of_, study_, found_->model, explained, marks, this->explained());
     std::vector<infer::Hypothesis> hypotheses;
     double best = 0;
     for (const EffectCandidate& mark : marks) {

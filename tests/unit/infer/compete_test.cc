@@ -304,17 +304,13 @@ TEST(InferCertificate, BoundIsTheCovarianceOfALine) {
   EXPECT_EQ(least_deviations(blind)[1], INFINITY);
 }
 
-// Each hypothesis by itself, at the size that the slopes of a log without it promise; where the
-// noise is to be fitted, and where it is known.
+// Each hypothesis by itself, at the size that the slopes of a log without it promise.
 TEST(InferCertificate, NamesWhatItCallsDetectableAsOftenAsPromised) {
   constexpr int kLogs = 200;
   constexpr double kLeastGain = 9;  // nats
   const Forward f = forward();
-  const std::pair<Hypothesis, double> cases[] = {
-      {offset(), kLeastScale}, {tilt(), kLeastScale}, {offset(), 1.2}};
-  for (const auto& [h, least_scale] : cases) {
-    Observations nothing = observed({{row("finger_friction"), 0.6}});
-    nothing.least_scale = least_scale;
+  for (const Hypothesis& h : {offset(), tilt()}) {
+    const Observations nothing = observed({{row("finger_friction"), 0.6}});
     const Model base = base_of(f, nothing);
     const Space own = base.space.only(h.coordinates);
     Fit fit = base.fit;
@@ -323,22 +319,19 @@ TEST(InferCertificate, NamesWhatItCallsDetectableAsOftenAsPromised) {
     ASSERT_TRUE(Fitter(f, nothing, base.space.with(h.coordinates)).differentiate(&fit, 1));
     const Eigen::MatrixXd I =
         information(fit.slopes.rightCols(own.dimensions()), 100 * fit.slopes.leftCols(1));
-    const double scale = std::max(kBestScaleOfGaussian, least_scale);
-    const double size =
-        std::sqrt(detectable_squares(kLeastGain, own.dimensions(), scale) / I(0, 0));
+    const double size = std::sqrt(detectable_squares(kLeastGain, own.dimensions()) / I(0, 0));
     Overrides truth = own.values(own.from({}) + size * Eigen::VectorXd::Unit(own.dimensions(), 0));
     truth[row("finger_friction")] = 0.6;
     int named = 0;
     for (int k = 0; k < kLogs; ++k) {
-      Observations o = observed(truth, false, 1000 + static_cast<std::uint64_t>(k));
-      o.least_scale = least_scale;
+      const Observations o = observed(truth, false, 1000 + static_cast<std::uint64_t>(k));
       const auto contest = compete(f, o, base_of(f, o), {h}, {}, nullptr);
       ASSERT_TRUE(contest);
       const std::vector<Contender>& all = contest->contenders;
       named +=
           !all.empty() && all[0].gain >= kLeastGain && all[0].gain >= kLeastSure * all[0].gain_se;
     }
-    EXPECT_NEAR(named, kDetectablePower * kLogs, 0.05 * kLogs) << h.name << ", " << least_scale;
+    EXPECT_NEAR(named, kDetectablePower * kLogs, 0.05 * kLogs) << h.name;
   }
 }
 
