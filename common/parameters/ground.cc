@@ -91,13 +91,6 @@ class Rows {
     }
     return most - least;
   }
-  double reach() const {
-    double farthest = 0;
-    for (const RobotWheel& w : robot_.wheels) {
-      farthest = std::max(farthest, std::hypot(*w.x_m, *w.y_m));
-    }
-    return farthest;
-  }
   // Of the first mecanum wheel, without its sign.
   double roller_angle() const {
     const auto first = std::find_if(robot_.wheels.begin(), robot_.wheels.end(),
@@ -109,16 +102,13 @@ class Rows {
     const bool skids = robot_.drive == DriveKind::kSkid || robot_.drive == DriveKind::kMecanum;
     return skids && robot_.wheels.size() == 4;
   }
-  bool steered() const {
-    return robot_.drive == DriveKind::kAckermann || robot_.drive == DriveKind::kTricycle;
-  }
 
   const GroundRobot& robot_;
 };
 
 void Rows::wheels() {
   // Throttle is an acceleration of the robot: no radius comes into it.
-  if (robot_.command == CommandKind::kThrottleSteering) return;
+  if (is_throttled(robot_)) return;
   std::set<std::string> done;
   for (const RobotWheel& w : robot_.wheels) {
     if (!w.driven || w.kind == WheelKind::kCaster || !done.insert(w.group).second) continue;
@@ -134,7 +124,7 @@ void Rows::wheels() {
 
 void Rows::sizes() {
   if (robot_.drive == DriveKind::kOmni) {
-    const double own = reach();
+    const double own = wheel_reach_m(robot_);
     size("robot_radius", "m", own, "centre to wheel", [own](GroundRobot& robot, double value) {
       for (RobotWheel& w : robot.wheels) {
         *w.x_m *= value / own;
@@ -143,7 +133,7 @@ void Rows::sizes() {
     });
     return;
   }
-  if (!steered()) {
+  if (!is_steered(robot_)) {
     const double own = extent(&RobotWheel::y_m);
     size("wheel_separation", "m", own, "left to right wheel, as they roll",
          stretch(own, &RobotWheel::y_m));
@@ -159,7 +149,7 @@ void Rows::sizes() {
   } else if (robot_.drive != DriveKind::kDifferential) {
     const double own = extent(&RobotWheel::x_m);
     const Put move = stretch(own, &RobotWheel::x_m);
-    const bool curve = steered();
+    const bool curve = is_steered(robot_);
     size("wheelbase", "m", own, "front to rear axle", [move, curve](GroundRobot& robot, double v) {
       move(robot, v);
       if (curve) robot.controller.wheelbase_m = v;
@@ -201,7 +191,7 @@ void Rows::floor() {
 }
 
 void Rows::body() {
-  const double far = reach();
+  const double far = wheel_reach_m(robot_);
   size("mass", "kg", *robot_.mass_kg, "of the whole robot",
        [](GroundRobot& robot, double v) { robot.mass_kg = v; });
   add("centre_of_mass.x", "m", *robot_.com_x_m - far / 2, *robot_.com_x_m + far / 2,
@@ -220,9 +210,10 @@ void Rows::motors() {
       "from a command to its wheel, the offset of the clocks included",
       [](GroundRobot& robot, double v) { robot.motors.delay_s = v; });
   add("lag", "s", 0, std::max(1.0, 2 * m.lag_s), m.lag_s,
-      steered() ? "first-order response of the steering" : "first-order response of the wheels",
+      is_steered(robot_) ? "first-order response of the steering"
+                         : "first-order response of the wheels",
       [](GroundRobot& robot, double v) { robot.motors.lag_s = v; });
-  if (robot_.command == CommandKind::kThrottleSteering) return;
+  if (is_throttled(robot_)) return;
   add(
       "acceleration_limit", "m/s^2", 0.01, kNoRamp_m_s2,
       m.acceleration_limit_m_s2.value_or(kNoRamp_m_s2), "of the wheels' surface",
@@ -243,7 +234,7 @@ void Rows::motors() {
 }
 
 void Rows::steering() {
-  if (!steered()) return;
+  if (!is_steered(robot_)) return;
   const RobotSteering& s = robot_.steering;
   add("steering.offset", "rad", s.offset_rad - 0.2, s.offset_rad + 0.2, s.offset_rad,
       "wheels point here when commanded straight",
@@ -262,7 +253,7 @@ void Rows::steering() {
 }
 
 void Rows::throttle() {
-  if (robot_.command != CommandKind::kThrottleSteering) return;
+  if (!is_throttled(robot_)) return;
   const RobotThrottle& t = robot_.throttle;
   const auto row = [&](const char* key, const char* unit, double RobotThrottle::*at, double least,
                        const char* summary) {
@@ -278,7 +269,7 @@ void Rows::throttle() {
 }
 
 void Rows::marker() {
-  const double far = reach();
+  const double far = wheel_reach_m(robot_);
   const Pose& X = robot_.X_RM;
   add("marker.x", "m", X.x - far, X.x + far, X.x, "the tracked point, ahead",
       [](GroundRobot& robot, double v) { robot.X_RM.x = v; });
@@ -289,7 +280,7 @@ void Rows::marker() {
 }
 
 void Rows::noise() {
-  for (Parameter& row : window_noise_rows(reach())) {
+  for (Parameter& row : window_noise_rows(wheel_reach_m(robot_))) {
     rows.push_back(std::move(row));
     puts.emplace_back();
   }

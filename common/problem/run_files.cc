@@ -50,7 +50,7 @@ Status read_problem_runs(std::span<const std::string> folders, const WindowSetti
   ASSIGN_OR_RETURN(auto cut, cut_windows(all, windows));
   if (problem->ground) {
     const GroundRobot& robot = problem->ground->robot();
-    if (robot.command == CommandKind::kThrottleSteering) {
+    if (is_throttled(robot)) {
       cut = restart_at_measured_speed(all, std::move(cut), windows.run_in_s, kWindowMargin_s);
     }
     cut.log.notes.insert(cut.log.notes.end(), robot.notes.begin(), robot.notes.end());

@@ -101,6 +101,38 @@ const RobotWheel* GroundRobot::wheel(std::string_view wanted) const {
   return found == wheels.end() ? nullptr : &*found;
 }
 
+const RobotWheel* driven_wheel(const GroundRobot& robot, std::optional<WheelSide> side) {
+  for (const RobotWheel& w : robot.wheels) {
+    if (w.driven && w.radius_m && w.side == side.value_or(w.side)) return &w;
+  }
+  return nullptr;
+}
+
+double side_radius_m(const GroundRobot& robot, std::string_view side) {
+  if (side != "left" && side != "right") return 0;
+  const RobotWheel* w = driven_wheel(robot, side == "left" ? WheelSide::kLeft : WheelSide::kRight);
+  return w == nullptr ? 0 : *w->radius_m;
+}
+
+double wheel_reach_m(const GroundRobot& robot) {
+  double farthest = 0;
+  for (const RobotWheel& w : robot.wheels) {
+    farthest = std::max(farthest, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
+  }
+  return farthest;
+}
+
+std::optional<std::size_t> channel_of(const RobotWheel& wheel,
+                                      const std::vector<std::string>& channels) {
+  const bool sided = wheel.side != WheelSide::kNone;
+  for (const std::string& name : {wheel.name, side_names()[static_cast<std::size_t>(wheel.side)]}) {
+    const auto found = std::find(channels.begin(), channels.end(), name);
+    if (found != channels.end()) return static_cast<std::size_t>(found - channels.begin());
+    if (!sided) break;
+  }
+  return {};
+}
+
 Status check_robot(const GroundRobot& robot) {
   const auto positive = [](const std::string& what, double value) -> Status {
     if (std::isfinite(value) && value > 0) return {};

@@ -143,6 +143,29 @@ struct GroundRobot {
   const RobotWheel* wheel(std::string_view wanted) const;
 };
 
+inline bool is_steered(const GroundRobot& robot) {
+  return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
+}
+inline bool is_holonomic(const GroundRobot& robot) {
+  return robot.drive == DriveKind::kOmni || robot.drive == DriveKind::kMecanum;
+}
+inline bool skids(const GroundRobot& robot) {
+  return robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
+}
+inline bool is_throttled(const GroundRobot& robot) {
+  return robot.command == CommandKind::kThrottleSteering;
+}
+
+// The first driven wheel whose radius is known, of all or of a side; null: there is none.
+const RobotWheel* driven_wheel(const GroundRobot& robot, std::optional<WheelSide> side = {});
+// That wheel's radius, of "left" or "right"; 0: there is none.
+double side_radius_m(const GroundRobot& robot, std::string_view side);
+// How far the farthest wheel stands from the origin; 0 where no place is known.
+double wheel_reach_m(const GroundRobot& robot);
+// The one of these names of channels that is the wheel's: its own name, or its side.
+std::optional<std::size_t> channel_of(const RobotWheel& wheel,
+                                      const std::vector<std::string>& channels);
+
 // Of a box of even mass about the vertical, kg m^2.
 inline double box_yaw_inertia(double mass_kg, double length_m, double width_m) {
   return mass_kg * (length_m * length_m + width_m * width_m) / 12;

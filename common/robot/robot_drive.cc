@@ -56,7 +56,7 @@ RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> com
                        double speed_m_s)
     : robot_(robot),
       track_(commands, robot.channels.size(), robot.motors.command_timeout_s),
-      steered_(robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle),
+      steered_(is_steered(robot)),
       lag_in_wheels_(!steered_),
       targets_(robot.wheels.size(), 0.0),
       limited_(robot.wheels.size(), 0.0),
@@ -65,10 +65,8 @@ RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> com
       throttle_m_s_(speed_m_s) {
   const auto& names = robot.channels;
   for (const RobotWheel& wheel : robot.wheels) {
-    int channel = index_of(names, wheel.name);
-    if (channel < 0 && wheel.side == WheelSide::kLeft) channel = index_of(names, "left");
-    if (channel < 0 && wheel.side == WheelSide::kRight) channel = index_of(names, "right");
-    channel_.push_back(wheel.driven ? channel : -1);
+    const auto channel = wheel.driven ? channel_of(wheel, names) : std::nullopt;
+    channel_.push_back(channel ? static_cast<int>(*channel) : -1);
   }
   v_ = index_of(names, "v");
   omega_ = index_of(names, "omega");
@@ -216,7 +214,7 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
     double speed = 0;
     bool steered_traction = false;
     double wanted = angle_of(at(commanded, steering_));
-    if (robot_.command == CommandKind::kThrottleSteering) {
+    if (is_throttled(robot_)) {
       speed = throttle(dead(at(commanded, throttle_)), dt_s, yaw_rate_rad_s);
     } else if (robot_.command == CommandKind::kTwist) {
       const double v = at(commanded, v_);

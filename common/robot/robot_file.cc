@@ -239,7 +239,7 @@ void write_steering(const GroundRobot& robot, Lines& out) {
   out.number("understeer", s.understeer_s2_m2);
   out.section("steering");
   steering_rows(out, s);
-  if (robot.command != CommandKind::kThrottleSteering) return;
+  if (!is_throttled(robot)) return;
   out.section("throttle");
   throttle_rows(out, robot.throttle);
 }

@@ -17,13 +17,6 @@ constexpr double kStep_s = 0.04;  // the longest
 // what a tracker errs by): a hard step would have no slope.
 constexpr double kEdge_m = 0.02;
 
-bool steered(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
-}
-bool holonomic(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kOmni || robot.drive == DriveKind::kMecanum;
-}
-
 // One number of the fit: where it is in a robot, or which gain of the motion.
 struct Row {
   const char* name;
@@ -32,15 +25,15 @@ struct Row {
 
 std::vector<Row> rows_of(const GroundRobot& robot) {
   std::vector<Row> rows;
-  if (holonomic(robot)) {
+  if (is_holonomic(robot)) {
     rows = {{"ahead", 1}, {"aside", 1}, {"turn", 1}};
-  } else if (!steered(robot)) {
+  } else if (!is_steered(robot)) {
     rows = {{"left", 1}, {"right", 1}, {"separation", 1}};
   } else {
     rows = {{"steering_gain", 1},
             {"steering_offset", 0},
             {"understeer", robot.steering.understeer_s2_m2}};
-    if (robot.command == CommandKind::kThrottleSteering) {
+    if (is_throttled(robot)) {
       const RobotThrottle& t = robot.throttle;
       rows.insert(rows.end(), {{"gain", t.gain},
                                {"zero", t.zero},
@@ -68,7 +61,7 @@ class Body {
     for (std::size_t i = 0; i < at.names.size(); ++i) {
       put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
     }
-    if (holonomic(robot_)) {
+    if (is_holonomic(robot_)) {
       omni_.emplace(robot_);
       omni_->load(load_);
       tractions_ = Eigen::VectorXd::Constant(omni_->wheels(), traction_);
@@ -83,12 +76,11 @@ class Body {
   GroundRobot corrected() const {
     GroundRobot robot = robot_;
     if (grip_m_s2_) robot.friction = *grip_m_s2_ / kGravity_m_s2 / robot.friction_ratio;
-    const bool skids = robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
     ControllerKinematics& k = robot.controller;
     // By four-point Coulomb theory the multiplier is 1 + (ratio wheelbase / wheel_separation)^2.
     const double multiplier = k.wheel_separation_multiplier * separation_ratio_;
     double along = 1, across = 1;
-    if (!skids) {
+    if (!skids(robot)) {
       across = separation_ratio_;
       if (k.wheel_separation_m) *k.wheel_separation_m *= across;
     } else {
@@ -107,7 +99,7 @@ class Body {
                                                         : travel_ * ahead_;
       *w.radius_m *= side;
     }
-    if (holonomic(robot)) correct_arms(&robot);
+    if (is_holonomic(robot)) correct_arms(&robot);
     if (robot.com_x_m) *robot.com_x_m = load_[0];
     if (robot.com_y_m) *robot.com_y_m = load_[1];
     return robot;
@@ -123,7 +115,7 @@ class Body {
     if (sag_ == 0 && drift_ == 0 && rate_ == 0) return logged;
     std::vector<CommandRow>& rows = *changed;
     rows.assign(logged.begin(), logged.end());
-    const bool throttled = robot_.command == CommandKind::kThrottleSteering;
+    const bool throttled = is_throttled(robot_);
     for (CommandRow& row : rows) {
       const double left = std::max(0.0, 1 - sag_ * (row.t_s - began_s) / 60);
       for (std::size_t c = 0; c < row.values.size(); ++c) {
@@ -143,10 +135,10 @@ class Body {
   // `X_WR`: where the robot is on two floors; null where there is one.
   Twist velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive,
                  const Pose* X_WR = nullptr) const {
-    if (steered(robot_)) {
+    if (is_steered(robot_)) {
       return on_floor(ahead_ * beyond_edge(X_WR, {}) * drive.traction_m_s(), drive.curvature());
     }
-    if (holonomic(robot_)) {
+    if (is_holonomic(robot_)) {
       Eigen::VectorXd speeds(inverse_.cols()), tractions(inverse_.cols());
       Eigen::Index n = 0;
       for (std::size_t i = 0; i < wheels.size(); ++i) {
@@ -183,7 +175,7 @@ class Body {
     if (is_magnitude(name)) value = std::abs(value);
     if (name == "left") left_ *= value;
     if (name == "right") right_ *= value;
-    if (name == "travel" && holonomic(robot_)) {
+    if (name == "travel" && is_holonomic(robot_)) {
       travel_ = value;
     } else if (name == "travel") {
       left_ *= value;

@@ -35,7 +35,7 @@ std::optional<double> rolling_wheelbase(const GroundRobot& robot, const Kinemati
 // between which of them the robot moves, and it stays wherever it was; where slip grows with force
 // it moves as least squares of their speeds, which is what kinematics make of them.
 bool wheels_disagree(const GroundRobot& robot) {
-  if (robot.drive != DriveKind::kOmni && robot.drive != DriveKind::kMecanum) return false;
+  if (!is_holonomic(robot)) return false;
   return std::ranges::count_if(robot.wheels, [](const RobotWheel& w) { return w.driven; }) > 3;
 }
 

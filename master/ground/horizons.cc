@@ -204,8 +204,7 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   asked.log = {};
   std::vector<Tiles> tiles;
   std::vector<std::size_t> run_of;  // of each window, in the log
-  const bool restarts =
-      fitted.ground && fitted.ground->robot().command == CommandKind::kThrottleSteering;
+  const bool restarts = fitted.ground && is_throttled(fitted.ground->robot());
   asked.runs.clear();
   for (const double horizon : windows.horizons_s) {
     auto cut = cut_windows(runs, {{horizon}, windows.run_in_s});

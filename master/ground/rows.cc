@@ -8,13 +8,7 @@
 namespace gapfarm {
 namespace {
 
-double wheel_reach_m(const GroundRobot& robot) {
-  double farthest = 1e-3;
-  for (const RobotWheel& w : robot.wheels) {
-    farthest = std::max(farthest, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
-  }
-  return farthest;
-}
+double reach_of(const GroundRobot& robot) { return std::max(wheel_reach_m(robot), 1e-3); }
 
 }  // namespace
 
@@ -27,7 +21,7 @@ double plausible_error(const KinematicRow& row) {
 
 std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   std::vector<KinematicRow> rows;
-  const double reach = wheel_reach_m(robot);
+  const double reach = reach_of(robot);
   if (is_holonomic(robot)) {
     rows = {{"ahead", 1, kGainShare, "ratio", "-"},
             {"aside", 1, kGainShare, "ratio", "-"},
@@ -62,7 +56,7 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
             {"separation", 1, separation, "ratio", "-"}};
   }
   const bool car = robot.drive == DriveKind::kAckermann;
-  const double marker = (car ? kCarMarkerShare : kMarkerShare) * wheel_reach_m(robot);
+  const double marker = (car ? kCarMarkerShare : kMarkerShare) * reach;
   const Pose& X = robot.X_RM;
   rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s", true});
   rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
@@ -86,7 +80,7 @@ std::vector<KinematicRow> change_rows(const GroundRobot& robot) {
   for (KinematicRow& row : rows) {
     if (const auto found = kept.find(row.name); found != kept.end()) row.tolerance = found->second;
     if (row.name == "marker_x" || row.name == "marker_y") {
-      row.tolerance = kMarkerShare * wheel_reach_m(robot);
+      row.tolerance = kMarkerShare * reach_of(robot);
     }
     if (row.name == "marker_yaw") row.tolerance = kMarkerYaw_rad;
   }

@@ -1,5 +1,5 @@
 // The numbers that steer the diagnosis of a ground robot, each with its unit, what it means and
-// where it comes from; and which kinds of robots have which values.
+// where it comes from.
 //
 // "Cases" below are those of scripts/wrong_robots.py and the practice cases (docs/ground.md): real
 // logs of 17 sets with one error or none.  Where a number was chosen on them, other logs will do
@@ -145,18 +145,5 @@ inline constexpr int kFolds = 5;             // of the blocks
 // Standard deviations of a 90 % interval by the folds' scatter: Student's of kFolds - 1 degrees.
 inline constexpr double kFoldTail = 2.13;
 inline constexpr int kGroundDraws = 400;  // of runs, with replacement
-
-inline bool is_steered(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
-}
-inline bool is_holonomic(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kOmni || robot.drive == DriveKind::kMecanum;
-}
-inline bool skids(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
-}
-inline bool is_throttled(const GroundRobot& robot) {
-  return robot.command == CommandKind::kThrottleSteering;
-}
 
 }  // namespace gapfarm

@@ -17,12 +17,10 @@ constexpr double kKnown = 1e-4;     // of a reading's variance: as good as none
 Knowledge::Knowledge(const GroundRobot& robot, const std::vector<KinematicRow>& rows,
                      const DriveNoise& noise)
     : noise_(noise),
+      reach_m_(wheel_reach_m(robot)),
       prior_(static_cast<Eigen::Index>(rows.size())),
       P_(Eigen::MatrixXd::Zero(3 + static_cast<Eigen::Index>(rows.size()),
                                3 + static_cast<Eigen::Index>(rows.size()))) {
-  for (const RobotWheel& wheel : robot.wheels) {
-    reach_m_ = std::max(reach_m_, std::hypot(wheel.x_m.value_or(0), wheel.y_m.value_or(0)));
-  }
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     prior_[i] = rows[k].farthest > 0 ? rows[k].farthest : plausible_error(rows[k]);

@@ -45,7 +45,7 @@ class Knowledge {
   Eigen::Vector3d reading() const;
 
   DriveNoise noise_;
-  double reach_m_ = 0;     // of the wheels
+  double reach_m_;         // of the wheels
   Eigen::VectorXd prior_;  // standard deviations of the rows
   Eigen::MatrixXd P_;
 };

@@ -37,20 +37,6 @@ struct LoopWindows {
   double fastest = 1e-9;
 };
 
-std::optional<std::size_t> wheel_channel(const RobotWheel& wheel,
-                                         const std::vector<std::string>& channels) {
-  const char* side = wheel.side == WheelSide::kLeft    ? "left"
-                     : wheel.side == WheelSide::kRight ? "right"
-                                                       : "";
-  for (const std::string& name : {wheel.name, std::string(side)}) {
-    const auto found = std::find(channels.begin(), channels.end(), name);
-    if (!name.empty() && found != channels.end()) {
-      return static_cast<std::size_t>(found - channels.begin());
-    }
-  }
-  return {};
-}
-
 void cut_run(const GroundRobot& robot, const RunLog& log, const LoggedRun& run, bool few,
              LoopWindows* to) {
   RobotDrive drive(robot, run.commands);
@@ -72,7 +58,7 @@ void cut_run(const GroundRobot& robot, const RunLog& log, const LoggedRun& run, 
       const RobotWheel& wheel = robot.wheels[i];
       if (!wheel.driven) continue;
       to->all.push_back({block, commanded[i] / steps / *wheel.radius_m,
-                         ran[*wheel_channel(wheel, log.wheel_channels)] / steps});
+                         ran[*channel_of(wheel, log.wheel_channels)] / steps});
       to->fastest = std::max(to->fastest, std::abs(to->all.back().commanded));
     }
     std::fill(commanded.begin(), commanded.end(), 0.0);
@@ -143,7 +129,7 @@ std::vector<double> draw_again(std::size_t blocks, Stream* stream) {
 bool has_wheel_speeds(const GroundRobot& robot, const RunLog& log) {
   if (is_steered(robot) || robot.measured || log.runs.empty()) return false;
   for (const RobotWheel& wheel : robot.wheels) {
-    if (wheel.driven && !wheel_channel(wheel, log.wheel_channels)) return false;
+    if (wheel.driven && !channel_of(wheel, log.wheel_channels)) return false;
   }
   return std::all_of(log.runs.begin(), log.runs.end(),
                      [](const LoggedRun& run) { return run.wheel_speeds.size() > 1; });

@@ -54,7 +54,7 @@ WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
                            const GroundReference* reference, FitMemo* memo)
     : robot_(robot), windows_(windows), reference_(reference), memo_(memo) {
   if (memo != nullptr) question_ = question_of(robot, windows, reference);
-  if (robot.command == CommandKind::kThrottleSteering) {
+  if (is_throttled(robot)) {
     shape_by_speed();
   } else if (!windows.noise.empty()) {
     shapes_ = noise_shapes(windows.least_noise);

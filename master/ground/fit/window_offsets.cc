@@ -32,10 +32,8 @@ class TwistReader {
  public:
   explicit TwistReader(const GroundRobot& robot) {
     half_m_ = robot.controller.wheel_separation_m.value_or(0) / 2;
-    double radius_m = 0;
-    for (const RobotWheel& w : robot.wheels) {
-      if (w.driven && radius_m == 0) radius_m = w.radius_m.value_or(0);
-    }
+    const RobotWheel* first = driven_wheel(robot);
+    const double radius_m = first == nullptr ? 0 : *first->radius_m;
     Eigen::Index lefts = 0, rights = 0;
     const auto n = static_cast<Eigen::Index>(robot.channels.size());
     ahead_ = rim_ = Eigen::VectorXd::Zero(n);

@@ -191,7 +191,7 @@ double WindowSet::stretches() const {
 Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
                              const WindowSettings& settings) {
   WindowSet set;
-  const bool restarts = robot.command == CommandKind::kThrottleSteering;
+  const bool restarts = is_throttled(robot);
   std::size_t last = 0;
   for (const double horizon : settings.horizons_s) {
     auto cut = cut_windows(log, {{horizon}, settings.run_in_s});

@@ -19,26 +19,18 @@ namespace {
 
 // The value to paste into the robot's file.
 std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Estimate& e) {
-  const auto of_group = [&](const char* group) {
-    for (const RobotWheel& w : robot.wheels) {
-      const bool side = (w.side == WheelSide::kLeft) == (std::string(group) == "left");
-      if (w.driven && side && w.side != WheelSide::kNone) return *w.radius_m;
-    }
-    return 0.0;
-  };
-  const auto ratio = [&](const char* word, double own, const char* unit) {
+  const auto ratio = [&](const std::string& word, double own, const char* unit) {
     return fmt::format("{} {:.5g} [{:.5g}, {:.5g}]{}; the file has {:.5g}", word,
                        own * (1 + e.value), own * (1 + e.lo), own * (1 + e.hi), unit, own);
   };
   const auto& k = robot.controller;
   const double base = row.nominal;
   if (row.name == "left" || row.name == "right") {
-    const double own = of_group(row.name.c_str());
-    return ratio(("wheels." + row.name + ".radius").c_str(), own, " m");
+    return ratio("wheels." + row.name + ".radius", side_radius_m(robot, row.name), " m");
   }
   if (row.name == "separation" && k.wheel_separation_m) {
     const double own = k.wheel_separation_multiplier;
-    if (own != 1 || robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked) {
+    if (own != 1 || skids(robot)) {
       return ratio("wheel_separation_multiplier", own, "");
     }
     return ratio("wheel_separation", *k.wheel_separation_m, " m");
@@ -71,14 +63,9 @@ double own_value(const GroundRobot& robot, const KinematicRow& row) {
   if (row.name == "traction") return 1;
   if (row.name == "separation") {
     const ControllerKinematics& k = robot.controller;
-    const bool skids = robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
-    return skids ? k.wheel_separation_multiplier : k.wheel_separation_m.value_or(0);
+    return skids(robot) ? k.wheel_separation_multiplier : k.wheel_separation_m.value_or(0);
   }
-  for (const RobotWheel& w : robot.wheels) {
-    const char* side = w.side == WheelSide::kLeft ? "left" : "right";
-    if (w.driven && w.side != WheelSide::kNone && row.name == side) return *w.radius_m;
-  }
-  return 0;
+  return side_radius_m(robot, row.name);
 }
 
 // Of several values of one name: which of them.

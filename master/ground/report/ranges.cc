@@ -27,16 +27,10 @@ constexpr double kLow = 0.05, kHigh = 0.95;
 
 // Sizes in m in place of ratios to them, of a robot with two sides.
 void put_size(const GroundRobot& robot, ValueRange* range) {
-  const auto radius = [&](WheelSide side) {
-    const auto w =
-        std::find_if(robot.wheels.begin(), robot.wheels.end(),
-                     [&](const RobotWheel& wheel) { return wheel.driven && wheel.side == side; });
-    return *w->radius_m;
-  };
   if (!has_simulator_model(robot)) return;
   if (range->kinematic == "left" || range->kinematic == "right") {
     range->name = range->kinematic + "_wheel_radius";
-    range->factor = radius(range->kinematic == "left" ? WheelSide::kLeft : WheelSide::kRight);
+    range->factor = side_radius_m(robot, range->kinematic);
   } else if (range->kinematic == "separation") {
     range->name = "wheel_separation";
     range->factor =

@@ -58,11 +58,8 @@ std::string joined(const std::vector<std::string>& items) {
 std::vector<RosValue> ros_values(const ReportedValues& reported) {
   const GroundRobot& robot = reported.given;
   const ControllerKinematics& k = robot.controller;
-  double radius = 0;
-  for (const RobotWheel& w : robot.wheels) {
-    if (w.driven && radius == 0) radius = w.radius_m.value_or(0);
-  }
-  radius = k.wheel_radius_m.value_or(radius);
+  const RobotWheel* first = driven_wheel(robot);
+  const double radius = k.wheel_radius_m.value_or(first == nullptr ? 0 : *first->radius_m);
   if (robot.drive == DriveKind::kMecanum) {
     double arm = 0;
     for (const RobotWheel& w : robot.wheels) {
@@ -74,13 +71,9 @@ std::vector<RosValue> ros_values(const ReportedValues& reported) {
                     {"travel", "ahead"}, {"turn"})};
   }
   if (robot.drive == DriveKind::kOmni) {
-    double arm = 0;
-    for (const RobotWheel& w : robot.wheels) {
-      arm = std::max(arm, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
-    }
     return {product(reported, "wheel_radius", radius, {"travel", "ahead"}),
-            product(reported, "robot_radius", k.robot_radius_m.value_or(arm), {"travel", "ahead"},
-                    {"turn"})};
+            product(reported, "robot_radius", k.robot_radius_m.value_or(wheel_reach_m(robot)),
+                    {"travel", "ahead"}, {"turn"})};
   }
   if (is_steered(robot)) {
     std::vector<RosValue> rows = {product(reported, "wheelbase", k.wheelbase_m.value_or(0),
@@ -101,13 +94,11 @@ std::vector<RosValue> ros_values(const ReportedValues& reported) {
 std::vector<RosValue> robot_sizes(const ReportedValues& reported) {
   std::vector<RosValue> rows;
   for (const WheelSide side : {WheelSide::kLeft, WheelSide::kRight}) {
-    const bool left = side == WheelSide::kLeft;
-    for (const RobotWheel& w : reported.given.wheels) {
-      if (!w.driven || w.side != side || !w.radius_m) continue;
-      const std::string key = std::string("wheels.") + (left ? "left" : "right") + ".radius";
-      rows.push_back(product(reported, key, *w.radius_m, {"travel", left ? "left" : "right"}));
-      break;
-    }
+    const RobotWheel* wheel = driven_wheel(reported.given, side);
+    if (wheel == nullptr) continue;
+    const std::string& name = side_names()[static_cast<std::size_t>(side)];
+    rows.push_back(product(reported, "wheels." + name + ".radius", *wheel->radius_m,
+                           {"travel", name.c_str()}));
   }
   if (const auto& separation = reported.given.controller.wheel_separation_m; separation) {
     rows.push_back(product(reported, "wheel_separation", *separation, {"separation"}));

@@ -40,13 +40,6 @@ constexpr double kSupport = 0.6;                            // of the separation
 constexpr double kGap_m = 2e-4;                             // of a support over the floor
 constexpr double kUnknownMass_kg = 10;                      // of a robot whose file has none
 
-const RobotWheel* side_wheel(const GroundRobot& robot, WheelSide side) {
-  for (const RobotWheel& w : robot.wheels) {
-    if (w.driven && w.side == side && w.radius_m) return &w;
-  }
-  return nullptr;
-}
-
 // What both models are made of, m, kg.
 struct TwoWheels {
   double radius[2] = {0, 0};  // left, right
@@ -55,9 +48,9 @@ struct TwoWheels {
   std::array<double, 3> com = {0, 0, 0};
 
   explicit TwoWheels(const GroundRobot& robot) {
-    const RobotWheel* left = side_wheel(robot, WheelSide::kLeft);
+    const RobotWheel* left = driven_wheel(robot, WheelSide::kLeft);
     radius[0] = *left->radius_m;
-    radius[1] = *side_wheel(robot, WheelSide::kRight)->radius_m;
+    radius[1] = *driven_wheel(robot, WheelSide::kRight)->radius_m;
     const ControllerKinematics& k = robot.controller;
     separation = *k.wheel_separation_m * k.wheel_separation_multiplier;
     width = left->width_m.value_or(0.4 * radius[0]);
@@ -89,7 +82,7 @@ std::string controller_text(const GroundRobot& given) {
   }
   if (given.command != CommandKind::kTwist) return "Controls are rad/s of the left, right wheel.";
   const ControllerKinematics& k = given.controller;
-  const double radius = k.wheel_radius_m.value_or(*side_wheel(given, WheelSide::kLeft)->radius_m);
+  const double radius = k.wheel_radius_m.value_or(*driven_wheel(given, WheelSide::kLeft)->radius_m);
   return fmt::format(
       "Controls are rad/s of the left, right wheel: (v - {0:.6g} omega) / {1:.6g}, (v + {0:.6g} "
       "omega) / {2:.6g}.",
@@ -119,11 +112,10 @@ std::string_view sdf_place(std::string_view value) {
 }
 
 bool has_simulator_model(const GroundRobot& robot) {
-  const bool two_sides = robot.drive == DriveKind::kDifferential ||
-                         robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
+  const bool two_sides = robot.drive == DriveKind::kDifferential || skids(robot);
   return two_sides && robot.controller.wheel_separation_m.has_value() &&
-         side_wheel(robot, WheelSide::kLeft) != nullptr &&
-         side_wheel(robot, WheelSide::kRight) != nullptr;
+         driven_wheel(robot, WheelSide::kLeft) != nullptr &&
+         driven_wheel(robot, WheelSide::kRight) != nullptr;
 }
 
 std::string mujoco_model(const GroundRobot& robot, const GroundRobot& given,

@@ -203,20 +203,20 @@ void take_commands(const std::vector<DriveFacts>& facts, GroundRobot& robot) {
   if (!facts.empty()) {
     robot.command = CommandKind::kTwist;
     robot.channels = {"v", "omega"};
-    if (robot.drive == DriveKind::kOmni || robot.drive == DriveKind::kMecanum) {
+    if (is_holonomic(robot)) {
       robot.channels.emplace_back("vy");
     }
     return;
   }
   robot.command = CommandKind::kWheelSpeeds;
   robot.channels = {"left", "right"};
-  if (robot.drive == DriveKind::kOmni || robot.drive == DriveKind::kMecanum) {
+  if (is_holonomic(robot)) {
     robot.channels.clear();
     for (const RobotWheel& wheel : robot.wheels) {
       if (wheel.driven) robot.channels.push_back(wheel.name);
     }
   }
-  if (robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle) {
+  if (is_steered(robot)) {
     robot.command = CommandKind::kSpeedSteering;
     robot.channels = {"speed", "steering"};
   }

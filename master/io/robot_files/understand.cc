@@ -93,8 +93,7 @@ class Understanding {
 
   // R: midway between the wheels that the drive turns about.
   void place_wheels() {
-    const bool car =
-        robot().drive == DriveKind::kAckermann || robot().drive == DriveKind::kTricycle;
+    const bool car = is_steered(robot());
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int count = 0;
     for (const ChassisWheel& wheel : chassis_.wheels) {
