@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "common/base/constants.h"
 #include "common/robot/robot_drive.h"
@@ -16,42 +17,6 @@ constexpr double kStep_s = 0.04;  // the longest
 // Half of the way over which a wheel passes from one floor to the other (what touches the floor and
 // what a tracker errs by): a hard step would have no slope.
 constexpr double kEdge_m = 0.02;
-
-// One number of the fit: where it is in a robot, or which gain of the motion.
-struct Row {
-  const char* name;
-  double nominal;
-};
-
-std::vector<Row> rows_of(const GroundRobot& robot) {
-  std::vector<Row> rows;
-  if (is_holonomic(robot)) {
-    rows = {{"ahead", 1}, {"aside", 1}, {"turn", 1}};
-  } else if (!is_steered(robot)) {
-    rows = {{"left", 1}, {"right", 1}, {"separation", 1}};
-  } else {
-    rows = {{"steering_gain", 1},
-            {"steering_offset", 0},
-            {"understeer", robot.steering.understeer_s2_m2}};
-    if (is_throttled(robot)) {
-      const RobotThrottle& t = robot.throttle;
-      rows.insert(rows.end(), {{"gain", t.gain},
-                               {"zero", t.zero},
-                               {"back_emf", t.back_emf},
-                               {"drag", t.drag},
-                               {"coulomb", t.coulomb},
-                               {"cornering", t.cornering}});
-    } else {
-      rows.push_back({"ahead", 1});
-    }
-  }
-  rows.insert(rows.end(), {{"lag", robot.motors.lag_s},
-                           {"delay", robot.motors.delay_s},
-                           {"marker_x", robot.X_RM.x},
-                           {"marker_y", robot.X_RM.y},
-                           {"marker_yaw", robot.X_RM.theta}});
-  return rows;
-}
 
 // The robot and the gains of its motion at some values.
 class Body {
@@ -335,14 +300,45 @@ bool is_magnitude(std::string_view name) {
          name == "cornering";
 }
 
+void Kinematics::add(std::string name, double value) {
+  names.push_back(std::move(name));
+  values.conservativeResize(values.size() + 1);
+  values[values.size() - 1] = value;
+}
+
+Eigen::Index Kinematics::index(std::string_view name) const {
+  const auto found = std::ranges::find(names, name);
+  return found == names.end() ? -1 : found - names.begin();
+}
+
+double Kinematics::value_or(std::string_view name, double otherwise) const {
+  const Eigen::Index at = index(name);
+  return at < 0 ? otherwise : values[at];
+}
+
 Kinematics nominal_kinematics(const GroundRobot& robot) {
   Kinematics k;
-  const std::vector<Row> rows = rows_of(robot);
-  k.values.resize(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    k.names.emplace_back(rows[i].name);
-    k.values[static_cast<Eigen::Index>(i)] = rows[i].nominal;
+  const auto add = [&](std::initializer_list<std::pair<const char*, double>> rows) {
+    for (const auto& [name, nominal] : rows) k.add(name, nominal);
+  };
+  if (is_holonomic(robot)) {
+    add({{"ahead", 1}, {"aside", 1}, {"turn", 1}});
+  } else if (!is_steered(robot)) {
+    add({{"left", 1}, {"right", 1}, {"separation", 1}});
+  } else {
+    const double understeer = robot.steering.understeer_s2_m2;
+    add({{"steering_gain", 1}, {"steering_offset", 0}, {"understeer", understeer}});
+    const RobotThrottle& t = robot.throttle;
+    if (is_throttled(robot)) {
+      add({{"gain", t.gain}, {"zero", t.zero}, {"back_emf", t.back_emf}});
+      add({{"drag", t.drag}, {"coulomb", t.coulomb}, {"cornering", t.cornering}});
+    } else {
+      add({{"ahead", 1}});
+    }
   }
+  add({{"lag", robot.motors.lag_s}, {"delay", robot.motors.delay_s}});
+  const Pose& X = robot.X_RM;
+  add({{"marker_x", X.x}, {"marker_y", X.y}, {"marker_yaw", X.theta}});
   return k;
 }
 

@@ -19,6 +19,11 @@ struct Kinematics {
   Eigen::VectorXd values;
   double rms_m = 0;  // of the windows that it was fitted to
   double rms_rad = 0;
+
+  void add(std::string name, double value);
+  // Where a name stands; -1: nowhere.
+  Eigen::Index index(std::string_view name) const;
+  double value_or(std::string_view name, double otherwise) const;
 };
 
 // Whether a value slows down by its size, whatever its sign (lags and drags): fits keep it at 0 or

@@ -20,9 +20,9 @@ constexpr double kEvenly = 0.3;
 // 1 + (friction_ratio wheelbase / wheel_separation)^2 as far apart: the wheelbase of which that is
 // what was fitted, wherever the axles are.
 std::optional<double> rolling_wheelbase(const GroundRobot& robot, const Kinematics& fitted) {
-  const auto name = std::find(fitted.names.begin(), fitted.names.end(), "separation");
-  if (robot.drive != DriveKind::kSkid || name == fitted.names.end()) return std::nullopt;
-  const double ratio = fitted.values[name - fitted.names.begin()];
+  const Eigen::Index at = fitted.index("separation");
+  if (robot.drive != DriveKind::kSkid || at < 0) return std::nullopt;
+  const double ratio = fitted.values[at];
   double separation = 0;
   for (const RobotWheel& w : robot.wheels) separation = std::max(separation, 2 * std::abs(*w.y_m));
   const ControllerKinematics& k = robot.controller;
@@ -165,7 +165,7 @@ Windows short_windows(const Problem& problem) {
 }
 
 void find_delay(const Windows& windows, Kinematics* at) {
-  const auto delay = std::find(at->names.begin(), at->names.end(), "delay") - at->names.begin();
+  const Eigen::Index delay = at->index("delay");
   const double own = at->values[delay];
   double least = 0;
   for (double shift = -kScan_s; shift <= kScan_s + 1e-9; shift += kScanStep_s) {

@@ -64,9 +64,7 @@ void leave_motors_out(Kinematics* values) {
   Kinematics kept;
   for (std::size_t k = 0; k < values->names.size(); ++k) {
     if (values->names[k] == "lag" || values->names[k] == "delay") continue;
-    kept.names.push_back(values->names[k]);
-    kept.values.conservativeResize(kept.values.size() + 1);
-    kept.values[kept.values.size() - 1] = values->values[static_cast<Eigen::Index>(k)];
+    kept.add(values->names[k], values->values[static_cast<Eigen::Index>(k)]);
   }
   *values = std::move(kept);
 }

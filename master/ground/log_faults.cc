@@ -26,16 +26,6 @@ constexpr int kClockSteps = 15;        // either way
 constexpr double kClockStep_s = 0.02;  // either way of the common delay
 constexpr double kNeverSo = -1e300;    // nats
 
-// Which run each window is of.
-std::vector<std::size_t> runs_of(const WindowSet& windows) {
-  std::vector<std::size_t> runs;
-  for (const int block : windows.block) {
-    const auto after = std::ranges::upper_bound(windows.run_blocks, block);
-    runs.push_back(static_cast<std::size_t>(after - windows.run_blocks.begin()) - 1);
-  }
-  return runs;
-}
-
 bool all_alike(const std::vector<CommandedRun>& runs) {
   const std::vector<double>* first = nullptr;
   for (const CommandedRun& run : runs) {
@@ -162,7 +152,7 @@ bool names_rounding(const GroundSearch& search) {
 
 std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit) {
   const WindowSet& windows = fitter.windows();
-  const std::vector<std::size_t> run = runs_of(windows);
+  const std::vector<std::size_t>& run = windows.run_of;
   std::vector<std::vector<double>> misses(windows.run_blocks.size());
   for (std::size_t i = 0; i < run.size(); ++i) {
     const Eigen::Vector3d& scale = fit.scales[static_cast<std::size_t>(windows.horizon[i])];
@@ -216,11 +206,9 @@ std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,
                                                   const WindowFit& fit) {
   const WindowSet& windows = fitter.windows();
   const std::size_t runs = windows.run_blocks.size();
-  const auto row = std::find_if(fit.rows.begin(), fit.rows.end(),
-                                [](const FitRow& r) { return r.row.name == "delay"; });
-  if (runs < 2 || runs > kMostRuns || row == fit.rows.end()) return {};
-  const Eigen::Index delay = row - fit.rows.begin();
-  const std::vector<std::size_t> run = runs_of(windows);
+  const Eigen::Index delay = row_index(fit.rows, "delay");
+  if (runs < 2 || runs > kMostRuns || delay < 0) return {};
+  const std::vector<std::size_t>& run = windows.run_of;
   std::vector<double> best(runs, kNeverSo), at_s(runs, 0.0), counts(runs, 0.0);
   for (const std::size_t r : run) counts[r] += 1;
   double common = kNeverSo;

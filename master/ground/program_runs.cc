@@ -28,16 +28,11 @@ constexpr const char* kAround[] = {"delay",      "marker_x",   "marker_y",
 // What a tracker makes of a motion between two poses of the robot.
 class TrackerReading {
  public:
-  TrackerReading(const Kinematics& at, const Pose& X_RM) : X_RM_(X_RM) {
-    for (std::size_t k = 0; k < at.names.size(); ++k) {
-      const double value = at.values[static_cast<Eigen::Index>(k)];
-      if (at.names[k] == "marker_x") X_RM_.x = value;
-      if (at.names[k] == "marker_y") X_RM_.y = value;
-      if (at.names[k] == "marker_yaw") X_RM_.theta = value;
-      if (at.names[k] == "pose_scale") scale_ = value;
-      if (at.names[k] == "aspect") aspect_ = value;
-    }
-  }
+  TrackerReading(const Kinematics& at, const Pose& X_RM)
+      : X_RM_{at.value_or("marker_x", X_RM.x), at.value_or("marker_y", X_RM.y),
+              at.value_or("marker_yaw", X_RM.theta)},
+        scale_(at.value_or("pose_scale", 1)),
+        aspect_(at.value_or("aspect", 1)) {}
   Pose end(const Pose& X_WS, const Pose& X_SE) const {
     const Pose X_true{X_WS.x / scale_, X_WS.y / scale_ / aspect_, X_WS.theta};
     const Pose X = X_true * inverse(X_RM_) * X_SE * X_RM_;
@@ -46,7 +41,7 @@ class TrackerReading {
 
  private:
   Pose X_RM_;
-  double scale_ = 1, aspect_ = 1;
+  double scale_, aspect_;
 };
 
 // A program, asked for whole runs at many values at once.

@@ -40,13 +40,13 @@ constexpr double kSharpGrip = 1.8;  // of its shape
 
 constexpr int kMostTraits = 3;
 
-double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, std::size_t grip) {
+double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, Eigen::Index grip) {
   for (double fall = kGripStep; fall < kMostUnsureGrip; fall += kGripStep) {
     Eigen::VectorXd values = fit.values;
     values[grip] -= fall;
     double best = fitter.hold(fit.rows, values).objective;
-    for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-      if (fit.rows[k].row.name == "grip_shape") values[k] = kSharpGrip;
+    if (const Eigen::Index shape = row_index(fit.rows, "grip_shape"); shape >= 0) {
+      values[shape] = kSharpGrip;
     }
     best = std::max(best, fitter.hold(fit.rows, values).objective);
     if (fit.objective - best > kLeastGripGain) return fall / 2;
@@ -139,10 +139,8 @@ Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow
 // Rows that hold both wheels and increments may have read them from clocks that are apart: where a
 // delay explains more than two halves of a log differ by, it is fitted after all.
 WindowFit with_delay(const WindowFitter& fitter, const WindowFit& fit) {
-  const auto row = std::find_if(fit.rows.begin(), fit.rows.end(),
-                                [](const FitRow& r) { return r.row.name == "delay"; });
-  if (row == fit.rows.end() || row->free) return fit;
-  const auto at = row - fit.rows.begin();
+  const Eigen::Index at = row_index(fit.rows, "delay");
+  if (at < 0 || fit.rows[at].free) return fit;
   std::vector<FitRow> rows = fit.rows;
   rows[at].free = true;
   rows[at].row.tolerance = kDelay_s;
@@ -242,13 +240,10 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
   reference.values = fit.values;
   reference.windows = fitter.ended_windows(fit);
   reference.draws = fitter.draws(fit, seed, /*all=*/alone).colwise() - fit.values;
-  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-    if (fit.rows[k].row.name != "grip") continue;
-    const double unsure = unsure_grip(fitter, fit, k);
+  if (const Eigen::Index grip = row_index(fit.rows, "grip"); grip >= 0) {
+    const double unsure = unsure_grip(fitter, fit, grip);
     Stream stream({seed, Purpose::kStatistics, 2, 0, 0});
-    for (double& off : reference.draws.row(k)) {
-      off += unsure * stream.normal();
-    }
+    for (double& off : reference.draws.row(grip)) off += unsure * stream.normal();
   }
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     const auto draws = reference.draws.row(k);
@@ -258,12 +253,6 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
   reference.covariance =
       reference.draws * reference.draws.transpose() / static_cast<double>(reference.draws.cols());
   return reference;
-}
-
-std::optional<double> value_in(const GroundReference& reference, const std::string& name) {
-  const auto found = std::find(reference.names.begin(), reference.names.end(), name);
-  if (found == reference.names.end()) return {};
-  return reference.values[found - reference.names.begin()];
 }
 
 }  // namespace
@@ -325,7 +314,7 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   question.catalogue = change_hypotheses(robot, question.rows);
   for (GroundHypothesis& h : question.catalogue) {
     for (KinematicRow& row : h.freed) {
-      row.nominal = value_in(*question.reference, row.name).value_or(row.nominal);
+      row.nominal = question.reference->value_or(row.name, row.nominal);
     }
   }
   return question;

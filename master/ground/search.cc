@@ -19,12 +19,6 @@ constexpr double kGripChanges[] = {0, -0.3, -0.7, -1.1, -1.6, -2.2, 0.5};
 constexpr double kGripShapes[] = {0.7, 1.8};
 constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the file's delay
 
-Eigen::Index row_index(const std::vector<FitRow>& rows, const std::string& name) {
-  const auto found =
-      std::find_if(rows.begin(), rows.end(), [&](const FitRow& r) { return r.row.name == name; });
-  return found == rows.end() ? -1 : found - rows.begin();
-}
-
 // Values whose grip is the best of those far and near: past the limit of a tyre no slope leads
 // back.
 Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,

@@ -85,11 +85,9 @@ Eigen::Vector3d Knowledge::reading() const {
 
 Steps::Steps(const GroundRobot& robot, const std::vector<KinematicRow>& rows)
     : robot_(robot), rows_(rows) {
-  for (const KinematicRow& row : rows) nominal_.names.push_back(row.name);
-  nominal_.values.resize(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const double least = is_magnitude(rows[k].name) ? rows[k].tolerance : rows[k].nominal;
-    nominal_.values[static_cast<Eigen::Index>(k)] = std::max(rows[k].nominal, least);
+  for (const KinematicRow& row : rows) {
+    const double least = is_magnitude(row.name) ? row.tolerance : row.nominal;
+    nominal_.add(row.name, std::max(row.nominal, least));
   }
 }
 

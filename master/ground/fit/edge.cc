@@ -24,18 +24,12 @@ constexpr double kTried[] = {0.75, 1 / 0.75};  // ratios, as of two floors that 
 constexpr std::size_t kClimbed = 4;            // of the angles, each from its best line
 
 struct EdgeRows {
-  Eigen::Index ratio = -1, angle = -1, offset = -1;
+  Eigen::Index ratio, angle, offset;
 };
 
 EdgeRows edge_rows(const std::vector<FitRow>& rows) {
-  EdgeRows at;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    if (rows[k].row.name == "edge_ratio") at.ratio = i;
-    if (rows[k].row.name == "edge_angle") at.angle = i;
-    if (rows[k].row.name == "edge_offset") at.offset = i;
-  }
-  return at;
+  return {row_index(rows, "edge_ratio"), row_index(rows, "edge_angle"),
+          row_index(rows, "edge_offset")};
 }
 
 double along_normal(const Pose& X, double angle) {

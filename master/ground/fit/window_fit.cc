@@ -26,20 +26,23 @@ double robust_deviation(std::vector<double>* sizes) {
 
 }  // namespace
 
-namespace {
-
-double gyro_ratio(const Kinematics& at) {
-  const auto found = std::find(at.names.begin(), at.names.end(), kGyroScale);
-  return found == at.names.end() ? 1 : at.values[found - at.names.begin()];
-}
-
-}  // namespace
-
 double window_nats(double residual, double scale) {
   static const double constant = std::lgamma((kWindowTail + 1) / 2) - std::lgamma(kWindowTail / 2) -
                                  0.5 * std::log(kWindowTail * std::acos(-1.0));
   const double z = residual / scale;
   return constant - std::log(scale) - (kWindowTail + 1) / 2 * std::log1p(z * z / kWindowTail);
+}
+
+void GroundReference::complete(Kinematics* at) const {
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (at->index(names[k]) < 0) at->add(names[k], values[static_cast<Eigen::Index>(k)]);
+  }
+}
+
+Eigen::Index row_index(const std::vector<FitRow>& rows, std::string_view name) {
+  const auto found =
+      std::ranges::find(rows, name, [](const FitRow& r) -> std::string_view { return r.row.name; });
+  return found == rows.end() ? -1 : found - rows.begin();
 }
 
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
@@ -106,13 +109,7 @@ Kinematics WindowFitter::kinematics(const std::vector<FitRow>& rows,
   Kinematics at;
   at.values = values;
   for (const FitRow& row : rows) at.names.push_back(row.row.name);
-  for (std::size_t k = 0; reference_ != nullptr && k < reference_->names.size(); ++k) {
-    const std::string& name = reference_->names[k];
-    if (std::find(at.names.begin(), at.names.end(), name) != at.names.end()) continue;
-    at.names.push_back(name);
-    at.values.conservativeResize(at.values.size() + 1);
-    at.values[at.values.size() - 1] = reference_->values[static_cast<Eigen::Index>(k)];
-  }
+  if (reference_ != nullptr) reference_->complete(&at);
   return at;
 }
 
@@ -131,7 +128,7 @@ std::vector<Eigen::Vector3d> WindowFitter::residuals(const Kinematics& at,
     const Trial& trial = windows_.trials[i];
     const Sense sense = windows_.sense_of(i);
     if (sense == Sense::kGyro) {
-      const double turned = windows_.turned_rad[i] / gyro_ratio(at);
+      const double turned = windows_.turned_rad[i] / at.value_or(kGyroScale, 1);
       r.emplace_back(0, 0, wrap_angle(turned - ends[i].theta + trial.X_WS.theta));
       continue;
     }

@@ -22,6 +22,9 @@ struct FitRow {
 // Standard deviation of a row's prior, from no data.
 double prior_deviation(const FitRow& row);
 
+// Where a row of this name stands; -1: nowhere.
+Eigen::Index row_index(const std::vector<FitRow>& rows, std::string_view name);
+
 // Where they stand as long as no log has its say.
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows);
 
@@ -35,14 +38,15 @@ struct EndedWindow {
 };
 
 // What a fit to another log says of the values, and how sure that is.
-struct GroundReference {
-  std::vector<std::string> names;
-  Eigen::VectorXd values;        // hold where they are not among the rows of a fit
+struct GroundReference : Kinematics {
   Eigen::MatrixXd draws;         // a column each: how far off the values may be, all at once
   std::vector<char> shown = {};  // of each: whether its log knows it better than its prior
   Eigen::MatrixXd covariance;
   std::vector<std::string> units = {};  // of each, of its difference from what it was
   std::vector<EndedWindow> windows = {};
+
+  // With its values where there are none.
+  void complete(Kinematics* at) const;
 };
 
 struct WindowFit {

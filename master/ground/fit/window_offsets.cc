@@ -71,10 +71,8 @@ class TwistReader {
 };
 
 double delay_of(const WindowFit& fit) {
-  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-    if (fit.rows[k].row.name == "delay") return fit.values[k];
-  }
-  return 0;
+  const Eigen::Index delay = row_index(fit.rows, "delay");
+  return delay < 0 ? 0 : fit.values[delay];
 }
 
 // The first row that acts after a time.

@@ -71,10 +71,7 @@ std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vec
 }
 
 Eigen::Index WindowFitter::in_reference(const FitRow& row) const {
-  if (reference_ == nullptr) return -1;
-  const auto& names = reference_->names;
-  const auto found = std::find(names.begin(), names.end(), row.row.name);
-  return found == names.end() ? -1 : found - names.begin();
+  return reference_ == nullptr ? -1 : reference_->index(row.row.name);
 }
 
 double prior_deviation(const FitRow& row) {

@@ -88,8 +88,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
     effect.alias_reason = "They move this robot alike on these runs.";
   }
   for (const KinematicRow& row : h.freed) {
-    for (std::size_t j = 0; j < search_.rows.size(); ++j) {
-      if (search_.rows[j].row.name != row.name) continue;
+    if (const Eigen::Index j = row_index(search_.rows, row.name); j >= 0) {
       effect.parameters.push_back(
           estimate_of(row, search_.fit.values[j], intervals_(j, 0), intervals_(j, 1)));
     }
@@ -383,17 +382,9 @@ Kinematics chosen_values(const GroundSearch& search) {
   Kinematics at;
   for (std::size_t j = 0; j < search.rows.size(); ++j) {
     if (!search.rows[j].free) continue;
-    at.names.push_back(search.rows[j].row.name);
-    at.values.conservativeResize(at.values.size() + 1);
-    at.values[at.values.size() - 1] = search.fit.values[j];
+    at.add(search.rows[j].row.name, search.fit.values[j]);
   }
-  for (std::size_t k = 0; search.reference && k < search.reference->names.size(); ++k) {
-    const std::string& name = search.reference->names[k];
-    if (std::find(at.names.begin(), at.names.end(), name) != at.names.end()) continue;
-    at.names.push_back(name);
-    at.values.conservativeResize(at.values.size() + 1);
-    at.values[at.values.size() - 1] = search.reference->values[k];
-  }
+  if (search.reference) search.reference->complete(&at);
   return at;
 }
 

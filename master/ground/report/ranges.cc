@@ -195,10 +195,9 @@ Eigen::MatrixXd draw_values(const Ranges& ranges, int count, std::uint64_t seed)
 
 GroundRobot robot_at(const Ranges& ranges, const Eigen::VectorXd& values) {
   Kinematics at;
-  at.values = values;
   for (std::size_t k = 0; k < ranges.values.size(); ++k) {
-    at.names.push_back(ranges.values[k].kinematic);
-    at.values[static_cast<Eigen::Index>(k)] /= ranges.values[k].factor;
+    const ValueRange& range = ranges.values[k];
+    at.add(range.kinematic, values[static_cast<Eigen::Index>(k)] / range.factor);
   }
   return robot_with(*ranges.robot, at);
 }
