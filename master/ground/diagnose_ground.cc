@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/base/guarded.h"
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/progress/stage_clock.h"
@@ -16,7 +17,9 @@ namespace gapfarm {
 namespace {
 
 GroundQuestion ask_what_is_wrong(const GroundRobot& robot, const RunLog& log) {
-  GroundQuestion question{kinematic_rows(robot), that_can_show(log, ground_hypotheses(robot)), {}};
+  GroundQuestion question;
+  question.rows = kinematic_rows(robot);
+  question.catalogue = that_can_show(log, ground_hypotheses(robot));
   add_gyro_scale(log, &question.rows);
   return question;
 }
@@ -28,12 +31,7 @@ Result<GroundRobot> sense(const GroundRobot& robot, const GroundDiagnoseOptions&
   std::erase_if(question->catalogue, [](const GroundHypothesis& h) {
     return !h.freed.empty() && h.freed[0].name.starts_with("marker_");
   });
-  ASSIGN_OR_RETURN(auto settled,
-                   settle_sensor(robot, *log, options.windows, *question, options.seed));
-  *log = std::move(settled.log);
-  question->faults = std::move(settled.faults);
-  question->fault_gains = std::move(settled.fault_gains);
-  question->sensor = std::move(settled.pose);
+  RETURN_IF_ERROR(settle_sensor(robot, options.windows, options.seed, log, question));
   GroundRobot sensed = robot;
   for (const SensorValue& v : question->sensor) {
     const bool x = v.row.name == "marker_x", y = v.row.name == "marker_y";
@@ -88,13 +86,9 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
     robot = std::move(sensed);
     file.X_RM = robot.X_RM;
   }
-  const GroundWork work = {[&](const std::string& stage) { clock.begin(stage); },
-                           options.on_progress,
-                           options.stopped,
-                           options.memo,
-                           options.on_finding,
-                           options.seed};
-  ASSIGN_OR_RETURN(auto search, search_ground(robot, log, options.windows, question, work));
+  GroundWork work = options;
+  work.on_stage = [&](const std::string& stage) { clock.begin(stage); };
+  ASSIGN_OR_RETURN(auto search, search_ground(robot, log, question, work));
   search.loop = loop;
   clock.begin(std::end(kGroundStages)[-1].name);
   GroundDiagnosis result = report_ground(robot, search, options);
@@ -109,7 +103,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
 constexpr std::size_t kMostOffersReported = 6;
 
 std::string things_of(const GroundSearch& search, const std::vector<std::size_t>& hypotheses) {
-  return joined(hypotheses, ", ", [&](const std::size_t h) { return search.catalogue[h].thing; });
+  return joined(hypotheses, ", ", [&](std::size_t h) { return search.catalogue[h].thing; });
 }
 
 // Faults of the log are looked for before.
@@ -145,7 +139,7 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
 }
 
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
-  const GroundQuestion question = ask_what_is_wrong(robot, log);
+  GroundQuestion question = ask_what_is_wrong(robot, log);
   const WindowSettings windows = {{2}, 0.5};
   const auto found = [&](std::size_t hypothesis, const std::string& evidence) {
     const GroundHypothesis& h = question.catalogue[hypothesis];
@@ -153,9 +147,10 @@ std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunL
                                        h.remedy, Severity::kWarning, true, h.aliases}};
   };
   if (log.relative) {
-    const auto settled = settle_sensor(robot, log, windows, question, 1);
-    if (!settled || settled->faults.empty()) return {};
-    return found(settled->faults.front(),
+    RunLog settled = log;
+    if (!settle_sensor(robot, windows, 1, &settled, &question) || question.faults.empty())
+      return {};
+    return found(question.faults.front().hypothesis,
                  "increments follow the robot's wheels, else they do not.");
   }
   const auto fault = find_ground_fault(robot, log, question, windows);
@@ -173,7 +168,7 @@ void emit_faults(const GroundWork& work, const GroundSearch& search) {
   finding.text = search.faults.empty()
                      ? "Nothing of the log is the wrong way round or in another unit."
                      : "With this put right, the log is far closer to what is expected: " +
-                           things_of(search, search.faults) + ".";
+                           things_of(search, mapped(search.faults, &FoundFault::hypothesis)) + ".";
   finding.text += fmt::format(" {} windows of {} stretches are held against the {}.",
                               search.windows.trials.size(), search.windows.blocks,
                               search.windows.simulated ? "program" : "robot's kinematics");

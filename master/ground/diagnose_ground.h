@@ -20,17 +20,10 @@
 
 namespace gapfarm {
 
-struct GroundDiagnoseOptions {
-  WindowSettings windows = {{0.5, 2, 5}, 0.5};
+struct GroundDiagnoseOptions : GroundWork {
   std::vector<std::string> excluded;  // hypotheses that are not to be thought of
-  std::uint64_t seed = 1;             // of the bootstrap
   // Of the same robot: asks what changed since; none: asks what of the file or the log is wrong.
   std::optional<RunLog> reference;
-  std::function<void(const std::string& stage)> on_stage;
-  std::function<void(std::size_t done, std::size_t total)> on_progress;  // of the stage
-  std::function<bool()> stopped;  // by the user; looked at between fits
-  FitMemo* memo = nullptr;        // outlives the diagnosis; none: every fit is made
-  OnFinding on_finding;           // of the present stage, for who watches; nothing depends on it
 };
 
 // Every stage in its order, with its share of the time, for progress.

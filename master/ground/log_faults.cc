@@ -17,10 +17,6 @@ std::vector<FitRow> held_rows(const GroundQuestion& question) {
   return rows;
 }
 
-const GroundReference* reference_of(const GroundQuestion& question) {
-  return question.reference ? &*question.reference : nullptr;
-}
-
 constexpr std::size_t kMostRuns = 9;
 constexpr int kClockSteps = 15;        // either way
 constexpr double kClockStep_s = 0.02;  // either way of the common delay
@@ -46,36 +42,43 @@ Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog
   return set;
 }
 
-std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
-                                             const GroundQuestion& question,
-                                             const WindowSettings& settings) {
-  const std::vector<GroundHypothesis>& catalogue = question.catalogue;
-  const GroundReference* reference = reference_of(question);
-  const std::vector<FitRow> rows = held_rows(question);
-  const auto as_logged = question.windows(robot, log, settings);
-  if (!as_logged) return std::nullopt;
-  const double before =
-      WindowFitter(robot, *as_logged, reference).hold(rows, nominals(rows)).objective;
+std::optional<GroundFault> best_fault(
+    const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
+    const WindowSettings& settings, double before, double least_shrinks, bool anywhere,
+    const std::function<double(const WindowFitter&, const RunLog&)>& objective_of) {
   std::optional<GroundFault> best;
-  for (std::size_t i = 0; i < catalogue.size(); ++i) {
-    if (!catalogue[i].put_right) continue;
-    GroundFault fault;
-    fault.hypothesis = i;
-    fault.log = log;
-    catalogue[i].put_right(&fault.log);
+  for (std::size_t i = 0; i < question.catalogue.size(); ++i) {
+    const GroundHypothesis& h = question.catalogue[i];
+    if (!h.put_right || (anywhere && h.of_world)) continue;
+    GroundFault fault{{i, 0}, 1, log, 0};
+    h.put_right(&fault.log);
     const auto windows = question.windows(robot, fault.log, settings);
     if (!windows) continue;
     const double stretches = windows->stretches();
+    const WindowFitter fitter(robot, *windows, question.reference);
     // Densities are of what was logged, in its own unit.
     fault.objective =
-        WindowFitter(robot, *windows, reference).hold(rows, nominals(rows)).objective +
-        stretches * std::log(catalogue[i].metres * catalogue[i].metres * catalogue[i].radians);
+        objective_of(fitter, fault.log) + stretches * std::log(h.metres * h.metres * h.radians);
     fault.gain = fault.objective - before;
     fault.shrinks = std::exp(fault.gain / (3 * stretches));
-    if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;
+    if (fault.gain < kFaultGain || fault.shrinks < least_shrinks) continue;
     if (!best || fault.gain > best->gain) best = std::move(fault);
   }
   return best;
+}
+
+std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
+                                             const GroundQuestion& question,
+                                             const WindowSettings& settings) {
+  const std::vector<FitRow> rows = held_rows(question);
+  const auto objective_of = [&](const WindowFitter& fitter, const RunLog&) {
+    return fitter.hold(rows, nominals(rows)).objective;
+  };
+  const auto as_logged = question.windows(robot, log, settings);
+  if (!as_logged) return std::nullopt;
+  const double before = objective_of(WindowFitter(robot, *as_logged, question.reference), log);
+  return best_fault(robot, log, question, settings, before, kFaultShrinks, /*anywhere=*/false,
+                    objective_of);
 }
 
 namespace {
@@ -114,27 +117,27 @@ void drop_stale_frames(GroundSearch* search) {
 
 }  // namespace
 
-Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
-                     const GroundQuestion& question, FitMemo* memo, GroundSearch* search) {
+Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
+                     const GroundWork& work, GroundSearch* search) {
   drop_stale_frames(search);
   for (;;) {
     const bool settled = !question.sensor.empty() || search->faults.size() >= kMostFaults;
-    auto fault = settled ? std::nullopt : find_ground_fault(robot, search->log, question, settings);
-    ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, settings));
+    auto fault =
+        settled ? std::nullopt : find_ground_fault(robot, search->log, question, work.windows);
+    ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, work.windows));
     search->windows = std::move(windows);
     search->rows = held_rows(question);
-    const WindowFitter fitter(robot, search->windows, reference_of(question), memo);
+    const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
     search->fit = fitter.fit(search->rows);
     // Values a little off must not do as well.
     if (!fault || fault->objective < search->fit.objective) break;
-    search->faults.push_back(fault->hypothesis);
-    search->fault_gains.push_back(fault->gain);
+    search->faults.push_back(*fault);
     search->log = std::move(fault->log);
   }
   if (!search->windows.noise.empty()) {
-    const WindowFitter as_stated(robot, search->windows, reference_of(question), memo);
+    const WindowFitter as_stated(robot, search->windows, question.reference, work.memo);
     search->windows.least_noise = as_stated.likeliest_least_noise(search->fit);
-    const WindowFitter fitter(robot, search->windows, reference_of(question), memo);
+    const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
     search->fit = fitter.fit(search->rows);
   }
   search->grid = grid_of(search->log);  // in metres by now

@@ -194,26 +194,10 @@ std::optional<GroundFault> fault_of_increments(const GroundRobot& robot, const R
                                                const WindowSettings& settings,
                                                const GroundQuestion& question,
                                                const WindowFit& fit) {
-  std::optional<GroundFault> best;
-  for (std::size_t i = 0; i < question.catalogue.size(); ++i) {
-    const GroundHypothesis& h = question.catalogue[i];
-    if (!h.put_right || h.of_world) continue;
-    GroundFault fault;
-    fault.hypothesis = i;
-    fault.log = log;
-    h.put_right(&fault.log);
-    const auto windows = window_set(robot, fault.log, settings);
-    if (!windows) continue;
-    const double stretches = windows->stretches();
-    const WindowFitter fitter(robot, *windows, nullptr);
-    fault.objective = open_fit(fitter, robot, question.rows, fault.log, kFaultRounds).objective +
-                      stretches * std::log(h.metres * h.metres * h.radians);
-    fault.gain = fault.objective - fit.objective;
-    fault.shrinks = std::exp(fault.gain / (3 * stretches));
-    if (fault.gain < kFaultGain || (best && fault.gain <= best->gain)) continue;
-    best = std::move(fault);
-  }
-  return best;
+  return best_fault(robot, log, question, settings, fit.objective, 0, /*anywhere=*/true,
+                    [&](const WindowFitter& fitter, const RunLog& right) {
+                      return open_fit(fitter, robot, question.rows, right, kFaultRounds).objective;
+                    });
 }
 
 // Whether the log is the wrong way round: put right, it fits better than with all values free.
@@ -281,7 +265,7 @@ Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
                  " windows of every length"};
   }
   ASSIGN_OR_RETURN(const auto windows, window_set(robot, log, kept));
-  WindowFitter fitter(robot, windows, nullptr);
+  WindowFitter fitter(robot, windows);
   const WindowFit fit = open_fit(fitter, robot, question.rows, log);
   if (const GroundHypothesis* h = fault_of(robot, log, settings, question, fitter, fit)) {
     return Error{"its log is wrong in " + h->thing + ". " + h->remedy};
@@ -298,10 +282,10 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   question.catalogue = that_can_show(reference, change_hypotheses(robot, question.rows));
   auto windows = window_set(robot, reference, settings);
   if (!windows) return Error{"the reference: " + windows.error().message};
-  const WindowFitter as_stated(robot, *windows, nullptr, memo);
+  const WindowFitter as_stated(robot, *windows, kNoReference, memo);
   WindowFit fit = open_fit(as_stated, robot, question.rows, reference);
   windows->least_noise = as_stated.likeliest_least_noise(fit);
-  const WindowFitter fitter(robot, *windows, nullptr, memo);
+  const WindowFitter fitter(robot, *windows, kNoReference, memo);
   if (!windows->noise.empty()) fit = fitter.fit(fit.rows, {}, fit.values);
   if (const GroundHypothesis* h = fault_of(robot, reference, settings, question, fitter, fit)) {
     return Error{"the log that values are fitted to is wrong in " + h->thing + ". " + h->remedy};
@@ -320,34 +304,29 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   return question;
 }
 
-Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
-                                    const WindowSettings& settings, const GroundQuestion& question,
-                                    std::uint64_t seed) {
-  SettledSensor settled;
+Status settle_sensor(const GroundRobot& robot, const WindowSettings& settings, std::uint64_t seed,
+                     RunLog* log, GroundQuestion* question) {
   for (;;) {
-    ASSIGN_OR_RETURN(const auto windows, window_set(robot, log, settings));
-    const WindowFitter fitter(robot, windows, nullptr);
-    const WindowFit fit = open_fit(fitter, robot, question.rows, log);
-    auto fault = settled.faults.size() < kMostFaults && !explains(fitter, fit)
-                     ? fault_of_increments(robot, log, settings, question, fit)
+    ASSIGN_OR_RETURN(const auto windows, window_set(robot, *log, settings));
+    const WindowFitter fitter(robot, windows);
+    const WindowFit fit = open_fit(fitter, robot, question->rows, *log);
+    auto fault = question->faults.size() < kMostFaults && !explains(fitter, fit)
+                     ? fault_of_increments(robot, *log, settings, *question, fit)
                      : std::nullopt;
     if (fault) {
-      settled.faults.push_back(fault->hypothesis);
-      settled.fault_gains.push_back(fault->gain);
-      log = std::move(fault->log);
+      question->faults.push_back(*fault);
+      *log = std::move(fault->log);
       continue;
     }
     const Eigen::MatrixX2d bounds = fitter.intervals(fit, seed);
     for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-      const KinematicRow& row = question.rows[k];
+      const KinematicRow& row = question->rows[k];
       if (!row.name.starts_with("marker_")) continue;
       const double had = value_in_file(robot, row.name);
-      settled.pose.push_back({row, had, fit.values[k], {bounds(k, 0), bounds(k, 1)}});
+      question->sensor.push_back({row, had, fit.values[k], {bounds(k, 0), bounds(k, 1)}});
     }
-    break;
+    return {};
   }
-  settled.log = std::move(log);
-  return settled;
 }
 
 }  // namespace gapfarm

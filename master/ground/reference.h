@@ -20,16 +20,9 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
 
 // Of increments it is open which way their sensor looks and where it stands: both are fitted with
 // every value, whatever the robot's file has, before anything else is asked.
-struct SettledSensor {
-  RunLog log;  // faults put right
-  std::vector<std::size_t> faults;
-  std::vector<double> fault_gains;
-  std::vector<SensorValue> pose;  // marker_x, marker_y (m), marker_yaw (rad)
-};
-// Errors: no window fits.
-Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
-                                    const WindowSettings& settings, const GroundQuestion& question,
-                                    std::uint64_t seed);
+// Faults are put right in the log, and both stand in the question then.  Errors: no window fits.
+Status settle_sensor(const GroundRobot& robot, const WindowSettings& settings, std::uint64_t seed,
+                     RunLog* log, GroundQuestion* question);
 
 // The values of change_rows() and of command_offsets() by one log alone; their covariance is by its
 // own scatter.  Errors: as ask_what_changed(); too few windows.

@@ -342,24 +342,18 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
 }  // namespace
 
 Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
-                                   const WindowSettings& settings, const GroundQuestion& question,
-                                   const GroundWork& work) {
+                                   const GroundQuestion& question, const GroundWork& work) {
   const auto stage = [&](const char* name) {
     if (work.on_stage) work.on_stage(name);
   };
   const Error stopped{"stopped"};
   GroundSearch search;
-  search.catalogue = question.catalogue;
-  search.reference = question.reference;
-  search.sensor = question.sensor;
-  search.faults = question.faults;
-  search.fault_gains = question.fault_gains;
+  static_cast<GroundBasis&>(search) = question;
   search.log = log;
   stage(kFaultStage);
-  RETURN_IF_ERROR(search_faults(robot, settings, question, work.memo, &search));
+  RETURN_IF_ERROR(search_faults(robot, question, work, &search));
   emit_faults(work, search);
-  const WindowFitter fitter(robot, search.windows,
-                            question.reference ? &*question.reference : nullptr, work.memo);
+  const WindowFitter fitter(robot, search.windows, search.reference, work.memo);
   stage(kCatalogueStage);
   search.chain.push_back(fit_held_out(fitter, {}, {}));
   while (search.steps.size() < kMostSteps && take_step(fitter, work, &search)) {
@@ -374,9 +368,8 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
     GroundQuestion as_it_is = question;
     as_it_is.catalogue.clear();
     as_it_is.faults.clear();
-    as_it_is.fault_gains.clear();
     as_it_is.sensor.clear();
-    return search_ground(robot, log, settings, as_it_is, work);
+    return search_ground(robot, log, as_it_is, work);
   }
   if (work.stopped && work.stopped()) return stopped;
   emit_rest(work, search);

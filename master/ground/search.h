@@ -50,14 +50,21 @@ struct SensorValue {
   Interval interval;  // 90 %
 };
 
-struct GroundQuestion {
-  std::vector<KinematicRow> rows;
+struct FoundFault {
+  std::size_t hypothesis = 0;
+  double gain = 0;  // nats
+};
+
+// What is asked of a log, and what was settled before values are named.
+struct GroundBasis {
   std::vector<GroundHypothesis> catalogue;
   std::optional<GroundReference> reference;  // the log that the rows' nominals are from
-  // Of increments: the sensor's pose as the robot has it by now, and what was put right before.
-  std::vector<SensorValue> sensor = {};
-  std::vector<std::size_t> faults = {};
-  std::vector<double> fault_gains = {};
+  std::vector<FoundFault> faults = {};       // of the log, as found; put right
+  std::vector<SensorValue> sensor = {};      // of increments: its pose as the robot has it by now
+};
+
+struct GroundQuestion : GroundBasis {
+  std::vector<KinematicRow> rows;
   // What follows the runs in place of the robot's kinematics; empty: they do.
   std::function<decltype(WindowSet::simulated)(const WindowSet&)> simulation = {};
 
@@ -66,26 +73,22 @@ struct GroundQuestion {
                             const WindowSettings& settings) const;
 };
 
-// Who waits for a search.
+// Who waits for a search, and how it is made.
 struct GroundWork {
-  std::function<void(const std::string&)> on_stage;
+  WindowSettings windows = {{0.5, 2, 5}, 0.5};
+  std::function<void(const std::string& stage)> on_stage;
   // Of the present stage; `total` may grow.
   std::function<void(std::size_t done, std::size_t total)> on_progress;
-  std::function<bool()> stopped;
-  FitMemo* memo = nullptr;
-  OnFinding on_finding;    // for who watches
-  std::uint64_t seed = 1;  // of the draws behind intervals
+  std::function<bool()> stopped;  // by the user; looked at between fits
+  FitMemo* memo = nullptr;        // outlives the work; none: every fit is made
+  OnFinding on_finding;           // of the present stage, for who watches; nothing depends on it
+  std::uint64_t seed = 1;         // of the draws behind intervals
 };
 
-struct GroundSearch {
-  std::vector<GroundHypothesis> catalogue;
-  std::optional<GroundReference> reference;
-  std::optional<WheelLoop> loop;    // where speeds were measured beside commands
-  std::vector<std::size_t> faults;  // of the log, as found; put right in `log`
-  std::vector<double> fault_gains;
-  std::vector<SensorValue> sensor = {};
-  PoseGrid grid;      // that the poses are rounded to
-  StaleFrames stale;  // taken out of `log`
+struct GroundSearch : GroundBasis {
+  std::optional<WheelLoop> loop;  // where speeds were measured beside commands
+  PoseGrid grid;                  // that the poses are rounded to
+  StaleFrames stale;              // taken out of `log`
   RunLog log;
   WindowSet windows;                       // of that log
   std::vector<std::vector<Offer>> offers;  // of each step, best first
@@ -106,29 +109,34 @@ struct GroundSearch {
   double unexplained = 0;  // share_unexplained() by the best
 };
 
-// A fault of the log that, put right, explains it far better than the file does as it is; nothing
-// where there is none.  In no time: no row moves.
-struct GroundFault {
-  std::size_t hypothesis = 0;
-  double gain = 0;       // nats
+struct GroundFault : FoundFault {
   double shrinks = 1;    // what residuals shrink by, in the geometric mean
   RunLog log;            // put right
-  double objective = 0;  // with the file's values, in nats of the log as it was
+  double objective = 0;  // in nats of the log as it was
 };
+
+// The fault of the log that, put right, explains it best; nothing where none gains `before` and
+// residuals that shrink so much.  `objective_of`: the nats of a log that was put right.
+// `anywhere`: without those that act along an axis of the world.
+std::optional<GroundFault> best_fault(
+    const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
+    const WindowSettings& settings, double before, double least_shrinks, bool anywhere,
+    const std::function<double(const WindowFitter&, const RunLog&)>& objective_of);
+
+// The same by the file's values, far better than with the log as it is.  In no time: no row moves.
 std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
                                              const GroundQuestion& question,
                                              const WindowSettings& settings);
 
 // Takes stale frames out of the search's log, puts right what is the wrong way round, finds the
 // grid of the poses, and fits what stands as it does.  Errors: no window fits.
-Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
-                     const GroundQuestion& question, FitMemo* memo, GroundSearch* search);
+Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
+                     const GroundWork& work, GroundSearch* search);
 
 // Where not even the best explains motions by commands, nothing is named and no fault put right.
 // Errors: no window fits, stopped.
 Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
-                                   const WindowSettings& settings, const GroundQuestion& question,
-                                   const GroundWork& work);
+                                   const GroundQuestion& question, const GroundWork& work);
 
 // What the poses show by themselves, where it matters.
 bool names_stale_frames(const GroundSearch& search);
@@ -156,9 +164,6 @@ std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit);
 // ends that it explains best: near 1 where commands have nothing to do with how the robot moved.
 // 0: all commands or all motions are alike, so that nobody knows.
 double share_unexplained(const WindowFitter& fitter, const WindowFit& fit);
-
-// Whether the runs of a log share a clock: each log may have its own offset between what commands
-// and what measures.
 
 struct RunClock {
   std::size_t run = 0;  // in the log

@@ -54,7 +54,7 @@ Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
 }
 
 WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
-                           const GroundReference* reference, FitMemo* memo)
+                           const std::optional<GroundReference>& reference, FitMemo* memo)
     : robot_(robot), windows_(windows), reference_(reference), memo_(memo) {
   if (memo != nullptr) question_ = question_of(robot, windows, reference);
   if (is_throttled(robot)) {
@@ -109,7 +109,7 @@ Kinematics WindowFitter::kinematics(const std::vector<FitRow>& rows,
   Kinematics at;
   at.values = values;
   for (const FitRow& row : rows) at.names.push_back(row.row.name);
-  if (reference_ != nullptr) reference_->complete(&at);
+  if (reference_) reference_->complete(&at);
   return at;
 }
 

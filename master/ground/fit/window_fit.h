@@ -82,12 +82,15 @@ struct OffsetFit {
   Eigen::MatrixXd covariance;
 };
 
+inline const std::optional<GroundReference> kNoReference;
+
 class WindowFitter {
  public:
   // All outlive the fitter.  With a reference its values are in place of the robot's, and rows are
   // held to them by their tolerance and by how sure it is of them.
   WindowFitter(const GroundRobot& robot, const WindowSet& windows,
-               const GroundReference* reference = nullptr, FitMemo* memo = nullptr);
+               const std::optional<GroundReference>& reference = kNoReference,
+               FitMemo* memo = nullptr);
 
   // Maximum over windows whose block is not in `left_out` (one flag a block; empty: none).
   // Starts at `values` where that has the size of `rows`, else at the rows' nominals; fewer rounds
@@ -175,7 +178,7 @@ class WindowFitter {
 
   const GroundRobot& robot_;
   const WindowSet& windows_;
-  const GroundReference* reference_;
+  const std::optional<GroundReference>& reference_;
   FitMemo* memo_;
   std::string question_;  // hash of robot, windows and reference; empty without a memo
   // Where a throttle leaves the speed unsure, the ends of a window err along its way above all;

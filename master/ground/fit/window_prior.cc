@@ -25,7 +25,7 @@ void add_pose(const Pose& X, Hasher* hasher) { hasher->add(X.x).add(X.y).add(X.t
 }  // namespace
 
 std::string question_of(const GroundRobot& robot, const WindowSet& windows,
-                        const GroundReference* reference) {
+                        const std::optional<GroundReference>& reference) {
   Hasher hasher;
   hasher.add(format_robot(robot));
   for (const CommandedRun& run : windows.runs) {
@@ -49,7 +49,7 @@ std::string question_of(const GroundRobot& robot, const WindowSet& windows,
   for (const Return& back : windows.returns) {
     for (const double variance : back.variance) hasher.add(variance);
   }
-  for (std::size_t k = 0; reference != nullptr && k < reference->names.size(); ++k) {
+  for (std::size_t k = 0; reference && k < reference->names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     hasher.add(reference->names[k]).add(reference->values[i]);
     for (Eigen::Index j = 0; j <= i; ++j) hasher.add(reference->covariance(i, j));
@@ -71,7 +71,7 @@ std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vec
 }
 
 Eigen::Index WindowFitter::in_reference(const FitRow& row) const {
-  return reference_ == nullptr ? -1 : reference_->index(row.row.name);
+  return !reference_ ? -1 : reference_->index(row.row.name);
 }
 
 double prior_deviation(const FitRow& row) {
@@ -85,7 +85,7 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
   for (Eigen::Index k = 0; k < n; ++k) {
     covariance(k, k) = std::pow(prior_deviation(rows[k]), 2);
   }
-  if (reference_ == nullptr) return covariance.diagonal().cwiseInverse().asDiagonal();
+  if (!reference_) return covariance.diagonal().cwiseInverse().asDiagonal();
   for (Eigen::Index k = 0; k < n; ++k) {
     const Eigen::Index a = in_reference(rows[k]);
     for (Eigen::Index l = 0; a >= 0 && l < n; ++l) {

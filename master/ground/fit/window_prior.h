@@ -20,6 +20,6 @@ double window_nats(double residual, double scale);
 
 // Hash of all that fits to these windows depend on beside rows and start.
 std::string question_of(const GroundRobot& robot, const WindowSet& windows,
-                        const GroundReference* reference);
+                        const std::optional<GroundReference>& reference);
 
 }  // namespace gapfarm

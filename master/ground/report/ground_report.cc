@@ -23,8 +23,7 @@ class GroundReport {
       : robot_(robot),
         search_(search),
         options_(options),
-        fitter_(robot, search.windows, search.reference ? &*search.reference : nullptr,
-                options.memo),
+        fitter_(robot, search.windows, search.reference, options.memo),
         intervals_(fitter_.intervals(search.fit, options.seed)) {}
 
   Diagnosis write();
@@ -116,14 +115,14 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
 }
 
 void GroundReport::faults() {
-  for (std::size_t k = 0; k < search_.faults.size(); ++k) {
-    const GroundHypothesis& h = search_.catalogue[search_.faults[k]];
+  for (const FoundFault& fault : search_.faults) {
+    const GroundHypothesis& h = search_.catalogue[fault.hypothesis];
     NamedEffect effect;
     effect.name = h.name;
     for (const std::string& alias : h.aliases) add_alias(alias, &effect);
     effect.confidence = kAlmostSure;
     effect.closed = effect.closed_hi = 1;
-    effect.gap_before = search_.fault_gains[k] / search_.windows.stretches();
+    effect.gap_before = fault.gain / search_.windows.stretches();
     const double shrinks = std::exp(effect.gap_before / 3);
     effect.text = fmt::format(
         "The log is wrong in {}: put right, what {} expects is {:.1f} times as near to what was "
