@@ -159,6 +159,9 @@ class LenientFields {
   static void convert(const Json& json, Number& to) {
     if (json.is_number()) to = json.get<Number>();
   }
+  static void convert(const Json& json, bool& to) {
+    if (json.is_boolean()) to = json.get<bool>();
+  }
   static void convert(const Json& json, std::optional<double>& to) {
     if (json.is_number()) to = json.get<double>();
   }
@@ -170,7 +173,8 @@ class LenientFields {
     convert(json[0], to.first);
     convert(json[1], to.second);
   }
-  static void convert(const Json& json, std::vector<TwoTexts>& to) {
+  template <class Item>
+  static void convert(const Json& json, std::vector<Item>& to) {
     if (!json.is_array()) return;
     for (const Json& item : json) convert(item, to.emplace_back());
   }

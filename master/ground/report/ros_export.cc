@@ -6,6 +6,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
+#include "common/base/try.h"
+#include "common/json/fields.h"
 #include "common/robot/robot_file.h"
 #include "common/score/kinematic.h"
 #include "master/ground/tolerances.h"
@@ -47,11 +51,17 @@ std::string interval_text(const RosValue& row, bool fitted) {
                    : "as you have it";
 }
 
-std::string joined(const std::vector<std::string>& items) {
-  std::string all;
-  for (const std::string& word : items) all += (all.empty() ? "" : ", ") + word;
-  return all.empty() ? "its log" : all;
+std::string logs_text(const std::vector<std::string>& logs) {
+  return logs.empty() ? "its log" : joined(logs);
 }
+
+constexpr auto kReportedValue = [](auto& v, auto& row) {
+  FIELDS(name, had);
+  v.field("says", row.reported);
+  v.field("lo", row.interval.lower);
+  v.field("hi", row.interval.upper);
+  FIELDS(named);
+};
 
 }  // namespace
 
@@ -193,7 +203,7 @@ std::string ros_table(const RosExport& data) {
 }
 
 std::string ros_yaml(const RosExport& data) {
-  std::string text = "# From " + data.source + ", fitted to " + joined(data.logs) +
+  std::string text = "# From " + data.source + ", fitted to " + logs_text(data.logs) +
                      ".\n# Merge into your controller's file; brackets are 90 % intervals.\n" +
                      data.controller + ":\n  ros__parameters:\n";
   for (const RosValue& row : data.values) {
@@ -208,7 +218,7 @@ std::string ros_yaml(const RosExport& data) {
 
 std::string ros_gazebo(const RosExport& data) {
   if (!data.friction.across) return {};
-  std::string text = "<!-- From " + data.source + ", fitted to " + joined(data.logs) + ": " +
+  std::string text = "<!-- From " + data.source + ", fitted to " + logs_text(data.logs) + ": " +
                      data.friction.from + ". mu1 is along the wheel, mu2 across. -->\n";
   for (const RosWheel& wheel : data.wheels) {
     text += fmt::format(
@@ -220,51 +230,32 @@ std::string ros_gazebo(const RosExport& data) {
 }
 
 nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const ReportedValue& v : values) {
-    rows.push_back({{"name", v.name},
-                    {"had", v.had},
-                    {"says", v.reported},
-                    {"lo", v.interval.lower},
-                    {"hi", v.interval.upper},
-                    {"named", v.named}});
-  }
-  return rows;
+  return FieldWriter::list(values, kReportedValue);
 }
 
 std::string format_values(const ReportedValues& values) {
-  const nlohmann::ordered_json json = {{"logs", values.logs},
-                                       {"values", values_json(values.values)},
-                                       {"robot", format_robot(values.given)}};
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  const Json json = {{"logs", values.logs},
+                     {"values", values_json(values.values)},
+                     {"robot", format_robot(values.given)}};
+  return json_text(json, 2) + "\n";
 }
 
 Result<ReportedValues> parse_values(const std::string& text, const std::string& path) {
-  const auto json = nlohmann::json::parse(text, nullptr, false);
-  const Error error{path + ": found no values of a ground robot's diagnosis; diagnose it again"};
-  if (!json.is_object() || !json.contains("values") || !json.contains("robot")) return error;
-  if (!json["robot"].is_string() || !json["values"].is_array()) return error;
-  auto robot = parse_robot(json["robot"].get<std::string>(), path);
-  if (!robot) return robot.error();
+  const Json json = parse_json(text);
   ReportedValues values;
-  values.given = *std::move(robot);
-  const auto number = [](const nlohmann::json& row, const char* key) {
-    return row.contains(key) && row[key].is_number() ? row[key].get<double>() : 0.0;
-  };
-  for (const auto& row : json["values"]) {
-    if (!row.is_object() || !row.contains("name") || !row["name"].is_string()) return error;
-    ReportedValue v;
-    v.name = row["name"].get<std::string>();
-    v.had = number(row, "had");
-    v.reported = number(row, "says");
-    v.interval = {number(row, "lo"), number(row, "hi")};
-    v.named = row.contains("named") && row["named"].is_boolean() && row["named"].get<bool>();
-    values.values.push_back(std::move(v));
+  std::string robot;
+  if (json.is_object()) {
+    const LenientFields fields(json);
+    fields.field("robot", robot);
+    fields.field("logs", values.logs);
+    fields.list("values", values.values, kReportedValue);
   }
-  if (!json.contains("logs") || !json["logs"].is_array()) return values;
-  for (const auto& log : json["logs"]) {
-    if (log.is_string()) values.logs.push_back(log.get<std::string>());
+  const bool whole = json.contains("values") && values.values.size() == json["values"].size() &&
+                     !contains(values.values, "", &ReportedValue::name);
+  if (robot.empty() || !whole) {
+    return Error{path + ": found no values of a ground robot's diagnosis; diagnose it again"};
   }
+  ASSIGN_OR_RETURN(values.given, parse_robot(robot, path));
   return values;
 }
 
