@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
+#include "common/json/matrix.h"
 #include "common/trials/files.h"
 #include "master/cli/data/export_source.h"
 #include "master/cli/subcommand.h"
@@ -92,29 +93,12 @@ Result<RosExport> export_of(const ExportCommand& command, Console& console) {
   return data;
 }
 
-nlohmann::ordered_json rows_json(const std::vector<RosValue>& values) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const RosValue& row : values) {
-    rows.push_back({{"key", row.key},
-                    {"had", row.had},
-                    {"says", row.reported},
-                    {"lo", row.interval.lower},
-                    {"hi", row.interval.upper},
-                    {"known", row.known}});
-  }
-  return rows;
-}
-
-nlohmann::ordered_json export_json(const RosExport& data) {
-  nlohmann::ordered_json json = {{"controller", data.controller},
-                                 {"values", rows_json(data.values)},
-                                 {"robot", rows_json(data.sizes)},
-                                 {"kinematics", values_json(data.kinematics)}};
-  nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
-  for (const auto& row : data.covariance.rowwise()) {
-    covariance.push_back(std::vector<double>(row.begin(), row.end()));
-  }
-  if (!covariance.empty()) json["covariance"] = covariance;
+Json export_json(const RosExport& data) {
+  Json json = {{"controller", data.controller},
+               {"values", values_json(data.values, "key", "known")},
+               {"robot", values_json(data.sizes, "key", "known")},
+               {"kinematics", values_json(data.kinematics)}};
+  if (data.covariance.size() > 0) json["covariance"] = data.covariance;
   if (data.friction.across) json["mu1"] = *data.friction.along;
   if (data.friction.across) json["mu2"] = *data.friction.across;
   return json;

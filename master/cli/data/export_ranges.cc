@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
+#include "common/json/matrix.h"
 #include "common/trials/files.h"
 #include "master/cli/data/export_source.h"
 #include "master/diagnose/result/diagnosis_json.h"
@@ -70,9 +71,7 @@ Result<int> export_ranges(ExportCommand& command, CliContext& context) {
   const Eigen::MatrixXd draws = draw_values(ranges, command.samples, command.seed);
   nlohmann::ordered_json json = ranges_json(ranges);
   const std::string toml = ranges_toml(json), yaml = ranges_yaml(json);
-  for (const auto& draw : draws.colwise()) {
-    json["samples"].push_back(std::vector<double>(draw.begin(), draw.end()));
-  }
+  if (command.samples > 0) json["samples"] = Eigen::MatrixXd(draws.transpose());
   if (command.out.empty()) {
     context.console.result(ranges_table(ranges) + "\n" + toml, json);
     return kExitDone;

@@ -17,11 +17,8 @@ constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two pos
 
 // Whether rows that hold wheels and increments were read at other times after all.
 bool clocks_are_apart(const GroundRobot& robot, const GroundReference& fit) {
-  for (std::size_t k = 0; k < fit.names.size(); ++k) {
-    const double value = fit.values[static_cast<Eigen::Index>(k)];
-    if (fit.names[k] == "delay") return std::abs(value - robot.motors.delay_s) > kLeastShift_s;
-  }
-  return false;
+  const double own = robot.motors.delay_s;
+  return std::abs(fit.value_or("delay", own) - own) > kLeastShift_s;
 }
 
 // Friction as the run has it, where the run searched for it.

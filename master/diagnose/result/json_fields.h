@@ -14,18 +14,8 @@
 
 #include "common/json/fields.h"
 #include "common/json/json.h"
+#include "common/json/matrix.h"
 #include "common/trials/trial.h"
-
-// A list a row.
-template <>
-struct nlohmann::adl_serializer<Eigen::MatrixXd> {
-  static void to_json(gapfarm::Json& json, const Eigen::MatrixXd& matrix) {
-    json = gapfarm::Json::array();
-    for (const auto& row : matrix.rowwise()) {
-      json.push_back(std::vector<double>(row.begin(), row.end()));
-    }
-  }
-};
 
 namespace gapfarm {
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/json/json.h"
+#include "common/json/matrix.h"
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
@@ -17,8 +18,6 @@
 
 namespace gapfarm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr double kBeginAt = 10;      // times the values' covariance, where they may vary
 constexpr double kFarthest = 4;      // standard deviations that no draw lies beyond
@@ -69,14 +68,6 @@ Eigen::MatrixXd correlation_of(const Ranges& ranges) {
     }
   }
   return r;
-}
-
-Json matrix_json(const Eigen::MatrixXd& matrix) {
-  Json rows = Json::array();
-  for (const auto& row : matrix.rowwise()) {
-    rows.push_back(std::vector<double>(row.begin(), row.end()));
-  }
-  return rows;
 }
 
 Json held_json(const Ranges& ranges) {
@@ -239,8 +230,8 @@ Json ranges_json(const Ranges& ranges) {
           {"not_in_mujoco", not_in_mujoco},
           {"not_in_sdf", not_in_sdf},
           {"names", names},
-          {"covariance", matrix_json(ranges.covariance)},
-          {"correlation", matrix_json(correlation_of(ranges))},
+          {"covariance", ranges.covariance},
+          {"correlation", correlation_of(ranges)},
           {"values", values},
           {"held", held},
           {"scatter", scatter}};

@@ -25,15 +25,15 @@ const ReportedValue* reported_value(const ReportedValues& reported, const std::s
 }
 
 // A product of ratios that are 1 in the robot's file, times what the file has.
-RosValue product(const ReportedValues& reported, const std::string& key, double had,
-                 std::initializer_list<const char*> over,
-                 std::initializer_list<const char*> under = {}) {
-  RosValue row{key, had, had, {had, had}, false};
+ReportedValue product(const ReportedValues& reported, const std::string& key, double had,
+                      std::initializer_list<const char*> over,
+                      std::initializer_list<const char*> under = {}) {
+  ReportedValue row{key, had, had, {had, had}, false};
   double least = had, most = had;
   const auto take = [&](const char* name, bool divide) {
     const ReportedValue* v = reported_value(reported, name);
     if (v == nullptr || !v->named || v->reported <= 0 || v->interval.lower <= 0) return;
-    row.known = true;
+    row.named = true;
     row.reported = divide ? row.reported / v->reported : row.reported * v->reported;
     least = divide ? least / v->interval.upper : least * v->interval.lower;
     most = divide ? most / v->interval.lower : most * v->interval.upper;
@@ -44,8 +44,8 @@ RosValue product(const ReportedValues& reported, const std::string& key, double 
   return row;
 }
 
-std::string interval_text(const RosValue& row, bool fitted) {
-  return row.known ? fmt::format("{:.4g} [{:.4g}, {:.4g}]", row.reported, row.interval.lower,
+std::string interval_text(const ReportedValue& row, bool fitted) {
+  return row.named ? fmt::format("{:.4g} [{:.4g}, {:.4g}]", row.reported, row.interval.lower,
                                  row.interval.upper)
          : fitted  ? "this log does not show it"
                    : "as you have it";
@@ -55,17 +55,20 @@ std::string logs_text(const std::vector<std::string>& logs) {
   return logs.empty() ? "its log" : joined(logs);
 }
 
-constexpr auto kReportedValue = [](auto& v, auto& row) {
-  FIELDS(name, had);
-  v.field("says", row.reported);
-  v.field("lo", row.interval.lower);
-  v.field("hi", row.interval.upper);
-  FIELDS(named);
-};
+auto describe_value(const char* name, const char* named) {
+  return [=](auto& v, auto& row) {
+    v.field(name, row.name);
+    FIELDS(had);
+    v.field("says", row.reported);
+    v.field("lo", row.interval.lower);
+    v.field("hi", row.interval.upper);
+    v.field(named, row.named);
+  };
+}
 
 }  // namespace
 
-std::vector<RosValue> ros_values(const ReportedValues& reported) {
+std::vector<ReportedValue> ros_values(const ReportedValues& reported) {
   const GroundRobot& robot = reported.given;
   const ControllerKinematics& k = robot.controller;
   const RobotWheel* first = driven_wheel(robot);
@@ -86,8 +89,8 @@ std::vector<RosValue> ros_values(const ReportedValues& reported) {
                     {"travel", "ahead"}, {"turn"})};
   }
   if (is_steered(robot)) {
-    std::vector<RosValue> rows = {product(reported, "wheelbase", k.wheelbase_m.value_or(0),
-                                          {"wheelbase"}, {"steering_gain"})};
+    std::vector<ReportedValue> rows = {product(reported, "wheelbase", k.wheelbase_m.value_or(0),
+                                               {"wheelbase"}, {"steering_gain"})};
     if (!is_throttled(robot)) {
       rows.push_back(product(reported, "traction_wheels_radius", radius, {"ahead"}));
     }
@@ -101,8 +104,8 @@ std::vector<RosValue> ros_values(const ReportedValues& reported) {
                   {"travel", "right"})};
 }
 
-std::vector<RosValue> robot_sizes(const ReportedValues& reported) {
-  std::vector<RosValue> rows;
+std::vector<ReportedValue> robot_sizes(const ReportedValues& reported) {
+  std::vector<ReportedValue> rows;
   for (const WheelSide side : {WheelSide::kLeft, WheelSide::kRight}) {
     const RobotWheel* wheel = driven_wheel(reported.given, side);
     if (wheel == nullptr) continue;
@@ -117,7 +120,9 @@ std::vector<RosValue> robot_sizes(const ReportedValues& reported) {
                                   {"marker.y", "marker_y"},
                                   {"marker.yaw", "marker_yaw"}}) {
     const ReportedValue* v = reported_value(reported, name);
-    if (v != nullptr) rows.push_back({key, v->had, v->reported, v->interval, v->named});
+    if (v == nullptr) continue;
+    rows.push_back(*v);
+    rows.back().name = key;
   }
   return rows;
 }
@@ -182,8 +187,8 @@ std::string ros_table(const RosExport& data) {
                                  "you have", "the log says (90 %)");
   for (const auto* rows : {&data.values, &data.sizes}) {
     if (rows == &data.sizes && !rows->empty()) text += "of robot.toml, m and rad\n";
-    for (const RosValue& row : *rows) {
-      text += fmt::format("{:<52} {:>10.4g}   {}\n", row.key, row.had,
+    for (const ReportedValue& row : *rows) {
+      text += fmt::format("{:<52} {:>10.4g}   {}\n", row.name, row.had,
                           interval_text(row, data.covariance.size() > 0));
     }
   }
@@ -206,11 +211,12 @@ std::string ros_yaml(const RosExport& data) {
   std::string text = "# From " + data.source + ", fitted to " + logs_text(data.logs) +
                      ".\n# Merge into your controller's file; brackets are 90 % intervals.\n" +
                      data.controller + ":\n  ros__parameters:\n";
-  for (const RosValue& row : data.values) {
-    text += row.known ? fmt::format("    {}: {:.6g}  # [{:.4g}, {:.4g}]; you had {:.6g}\n", row.key,
-                                    row.reported, row.interval.lower, row.interval.upper, row.had)
-                      : fmt::format("    {}: {:.6g}  # as you have it: the log shows no other\n",
-                                    row.key, row.had);
+  for (const ReportedValue& row : data.values) {
+    text += row.named
+                ? fmt::format("    {}: {:.6g}  # [{:.4g}, {:.4g}]; you had {:.6g}\n", row.name,
+                              row.reported, row.interval.lower, row.interval.upper, row.had)
+                : fmt::format("    {}: {:.6g}  # as you have it: the log shows no other\n",
+                              row.name, row.had);
   }
   for (const std::string& remark : data.remarks) text += "    # " + remark + "\n";
   return text;
@@ -229,8 +235,9 @@ std::string ros_gazebo(const RosExport& data) {
   return text;
 }
 
-nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values) {
-  return FieldWriter::list(values, kReportedValue);
+nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values, const char* name,
+                                   const char* named) {
+  return FieldWriter::list(values, describe_value(name, named));
 }
 
 std::string format_values(const ReportedValues& values) {
@@ -248,7 +255,7 @@ Result<ReportedValues> parse_values(const std::string& text, const std::string& 
     const LenientFields fields(json);
     fields.field("robot", robot);
     fields.field("logs", values.logs);
-    fields.list("values", values.values, kReportedValue);
+    fields.list("values", values.values, describe_value("name", "named"));
   }
   const bool whole = json.contains("values") && values.values.size() == json["values"].size() &&
                      !contains(values.values, "", &ReportedValue::name);

@@ -17,13 +17,15 @@ namespace gapfarm {
 // values.json of a ground robot's diagnosis: what its file had and what the log says, for programs
 // and for gapfarm export.
 
-// A number of the kinematic model.
+// A number of the kinematic model, or a controller's parameter.
 struct ReportedValue {
-  std::string name;  // "separation", "left", ...
+  std::string name;  // "separation", "left", ...; "wheel_separation_multiplier"
   double had = 0;    // by the robot's file
   double reported = 0;
-  Interval interval;   // 90 %
-  bool named = false;  // the log says that it is another; else it is within what files are off by
+  Interval interval;  // 90 %
+  // The log says that it is another; else it is within what files are off by, and a parameter is
+  // the file's own.
+  bool named = false;
 };
 
 struct ReportedValues {
@@ -32,20 +34,12 @@ struct ReportedValues {
   std::vector<ReportedValue> values;
 };
 
-// A list of {name, had, says, lo, hi, named}.
-nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values);
+// A list of {name, had, says, lo, hi, named}; the first and the last by these words.
+nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values,
+                                   const char* name = "name", const char* named = "named");
 std::string format_values(const ReportedValues& values);
 // Errors: `path` names the text, which is no such file.
 Result<ReportedValues> parse_values(const std::string& text, const std::string& path);
-
-// A line of a controller's parameters.
-struct RosValue {
-  std::string key;  // "wheel_separation_multiplier"
-  double had = 0;
-  double reported = 0;
-  Interval interval;
-  bool known = false;  // the interval is of this log; else the value is the file's own
-};
 
 // Friction of the floor, where the log or the simulation shows it.
 struct RosFriction {
@@ -62,21 +56,21 @@ struct RosExport {
   std::string source;             // run or diagnosis
   std::vector<std::string> logs;  // that it was fitted to
   std::string controller;         // its name in the user's file
-  std::vector<RosValue> values;
+  std::vector<ReportedValue> values;
   std::vector<std::string> remarks;  // what no controller has a word for
   RosFriction friction;
   std::vector<RosWheel> wheels;
   // All that was fitted, by the kinematic model's names, and its covariance (of a fit; else empty).
   std::vector<ReportedValue> kinematics = {};
   Eigen::MatrixXd covariance = {};
-  std::vector<RosValue> sizes = {};
+  std::vector<ReportedValue> sizes = {};
 };
 
 // The controller's parameters by what a log says; names and values follow the drive.
-std::vector<RosValue> ros_values(const ReportedValues& reported);
+std::vector<ReportedValue> ros_values(const ReportedValues& reported);
 // The robot's sizes in the words of robot.toml, m and rad: wheels of robots with two sides, their
 // separation, the marker (without a tracker: the sensor).
-std::vector<RosValue> robot_sizes(const ReportedValues& reported);
+std::vector<ReportedValue> robot_sizes(const ReportedValues& reported);
 // What is off and has no parameter: a trim of the steering, a delay.
 std::vector<std::string> ros_remarks(const ReportedValues& reported);
 // Of the floor as far as the robot's motion shows: a car's grip, a skid-steer's multiplier.

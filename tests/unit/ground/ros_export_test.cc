@@ -29,13 +29,13 @@ TEST(RosExport, GivesMultipliersWithWhatTheUserHad) {
                                                        {"separation", 1, 0.8, {0.79, 0.82}, true}});
   const auto values = ros_values(reported);
   ASSERT_EQ(values.size(), 3u);
-  EXPECT_EQ(values[0].key, "wheel_separation_multiplier");
+  EXPECT_EQ(values[0].name, "wheel_separation_multiplier");
   EXPECT_DOUBLE_EQ(values[0].had, 1.875);
   EXPECT_DOUBLE_EQ(values[0].reported, 1.5);
   EXPECT_DOUBLE_EQ(values[0].interval.lower, 1.875 * 0.79);
   EXPECT_DOUBLE_EQ(values[1].reported, 0.98);
   // What the log does not say stays as the user has it.
-  EXPECT_FALSE(values[2].known);
+  EXPECT_FALSE(values[2].named);
   EXPECT_DOUBLE_EQ(values[2].reported, 1);
   RosExport data{"diagnosis", reported.logs, "husky_velocity_controller", values, {}, {}, {}};
   const std::string yaml = ros_yaml(data);
@@ -67,7 +67,7 @@ TEST(RosExport, SpeaksOfCarsInTheirControllersText) {
                          {"grip", 1.9, std::log(4.905), {std::log(4.5), std::log(5.5)}, true}});
   const auto values = ros_values(reported);
   ASSERT_FALSE(values.empty());
-  EXPECT_EQ(values[0].key, "wheelbase");
+  EXPECT_EQ(values[0].name, "wheelbase");
   EXPECT_NEAR(values[0].reported, 0.3 / 1.1, 1e-12);
   EXPECT_LT(values[0].interval.lower, values[0].interval.upper);
   const auto remarks = ros_remarks(reported);
