@@ -45,8 +45,7 @@ double travel_of(const LoggedRun& run, const Trial& trial) {
 
 Pose constant_end(const LoggedRun& run, const Trial& trial) {
   const std::vector<PoseRow>& poses = run.poses;
-  const auto here = std::lower_bound(poses.begin(), poses.end(), *trial.t_s,
-                                     [](const PoseRow& p, double t) { return p.t_s < t; });
+  const auto here = std::ranges::lower_bound(poses, *trial.t_s, {}, &PoseRow::t_s);
   auto before = here;
   while (before != poses.begin() && (before - 1)->t_s >= *trial.t_s - kSpeedSpan_s) --before;
   if (before == here) return trial.X_WS;

@@ -144,18 +144,11 @@ WindowFit with_delay(const WindowFitter& fitter, const WindowFit& fit) {
   std::vector<FitRow> rows = fit.rows;
   rows[at].free = true;
   rows[at].row.tolerance = kDelay_s;
-  Eigen::VectorXd best = fit.values;
-  double most = fit.objective;
+  std::vector<Eigen::VectorXd> others;
   for (double size = kShift_s; size <= kMostShift_s; size *= 1.5) {
-    for (const double shift : {size, -size}) {
-      Eigen::VectorXd values = fit.values;
-      values[at] += shift;
-      const double objective = fitter.hold(rows, values).objective;
-      if (objective <= most) continue;
-      most = objective;
-      best = values;
-    }
+    for (const double shift : {size, -size}) others.emplace_back(fit.values)[at] += shift;
   }
+  const Eigen::VectorXd best = best_held(fitter, rows, fit.values, fit.objective, others);
   if (best == fit.values) return fit;
   WindowFit moved = fitter.fit(rows, {}, best);
   return moved.objective > fit.objective + kLeastChangeGain ? moved : fit;

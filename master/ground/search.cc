@@ -6,6 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/math/statistics.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/report/ground_text.h"
@@ -24,20 +25,15 @@ constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the 
 Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                           const Eigen::VectorXd& values) {
   const Eigen::Index grip = row_index(rows, "grip"), shape = row_index(rows, "grip_shape");
-  Eigen::VectorXd best = values;
-  double most = fitter.hold(rows, values).objective;
+  std::vector<Eigen::VectorXd> others;
   for (const double change : kGripChanges) {
     for (const double sharp : kGripShapes) {
-      Eigen::VectorXd moved = values;
+      Eigen::VectorXd& moved = others.emplace_back(values);
       moved[grip] += change;
       moved[shape] = sharp;
-      const double objective = fitter.hold(rows, moved).objective;
-      if (objective <= most) continue;
-      most = objective;
-      best = moved;
     }
   }
-  return best;
+  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
 }
 
 // `slopes`: of the search's fit.
@@ -149,15 +145,9 @@ HeldOutGain gain_beyond_traces(const WindowSet& windows, const GroundWork& work,
   return held_out_gain(windows, counted, candidate.before, work.seed);
 }
 
-double mean_nats(const WindowFit& fit) {
-  double sum = 0;
-  for (const double nats : fit.nats) sum += nats;
-  return sum / static_cast<double>(fit.nats.size());
-}
-
 void keep_if_best(GroundSearch* search, WindowFit held_out, std::string what) {
   const bool first = search->best.nats.empty();
-  if (!first && !(mean_nats(held_out) > mean_nats(search->best))) return;
+  if (!first && !(mean(held_out.nats) > mean(search->best.nats))) return;
   search->best = std::move(held_out);
   search->best_of_all = std::move(what);
 }
@@ -284,24 +274,30 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
 
 }  // namespace
 
+Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                          const Eigen::VectorXd& values, double most,
+                          const std::vector<Eigen::VectorXd>& others) {
+  Eigen::VectorXd best = values;
+  for (const Eigen::VectorXd& other : others) {
+    const double objective = fitter.hold(rows, other).objective;
+    if (objective <= most) continue;
+    most = objective;
+    best = other;
+  }
+  return best;
+}
+
 Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                            const Eigen::VectorXd& values) {
-  const Eigen::Index delay = row_index(rows, "delay");
-  Eigen::VectorXd best = values;
-  double most = fitter.hold(rows, values).objective;
+  std::vector<Eigen::VectorXd> others;
   for (double size = 0.1; size <= kFar_s; size += size < kNear_s     ? 0.1
                                                   : size < kMiddle_s ? 0.25
                                                                      : 0.5) {
     for (const double shift : {size, -size}) {
-      Eigen::VectorXd moved = values;
-      moved[delay] += shift;
-      const double objective = fitter.hold(rows, moved).objective;
-      if (objective <= most) continue;
-      most = objective;
-      best = moved;
+      others.emplace_back(values)[row_index(rows, "delay")] += shift;
     }
   }
-  return best;
+  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
 }
 
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,

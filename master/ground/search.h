@@ -142,6 +142,12 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
 bool names_stale_frames(const GroundSearch& search);
 bool names_rounding(const GroundSearch& search);
 
+// The best of some values, each as it is with scales of its own, and of those that `most` nats are
+// of.
+Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                          const Eigen::VectorXd& values, double most,
+                          const std::vector<Eigen::VectorXd>& others);
+
 // Values whose delay is the best of those within 10 s of where it stands: one that is far off is
 // no slope away.
 Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,

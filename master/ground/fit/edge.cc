@@ -65,11 +65,9 @@ bool parts_windows(const WindowFitter& fitter, const WindowFit& fit) {
 // 90 % of some draws; no less wide than a deviation with the folds' degrees of freedom.
 Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
                           double deviation, const char* unit) {
-  std::sort(draws.begin(), draws.end());
-  const std::size_t n = draws.size();
+  const auto [lo, hi] = ninety_percent_of(std::move(draws));
   const double half = kFoldTail * deviation;
-  return {key, value, std::min(draws[n / 20], value - half),
-          std::max(draws[n - 1 - n / 20], value + half), unit};
+  return {key, value, std::min(lo, value - half), std::max(hi, value + half), unit};
 }
 
 // Of the mean of columns that each omit one part of the log in turn (the jackknife).

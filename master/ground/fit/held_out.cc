@@ -1,8 +1,10 @@
 #include "master/ground/fit/held_out.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/random/stream.h"
 #include "master/ground/tolerances.h"
 
@@ -11,16 +13,10 @@ namespace {
 
 // First block and count of every run that has windows.
 std::vector<std::pair<int, int>> blocks_of_runs(const WindowSet& windows) {
-  std::vector<std::pair<int, int>> runs;
-  for (std::size_t r = 0; r < windows.run_blocks.size(); ++r) {
-    const int first = windows.run_blocks[r];
-    const bool last = r + 1 == windows.run_blocks.size();
-    const int end = last ? windows.blocks : windows.run_blocks[r + 1];
-    const bool used = std::any_of(windows.block.begin(), windows.block.end(),
-                                  [&](int block) { return block >= first && block < end; });
-    if (used) runs.emplace_back(first, end - first);
-  }
-  return runs;
+  const std::set<std::size_t> used(windows.run_of.begin(), windows.run_of.end());
+  return mapped(used, [&](std::size_t run) {
+    return std::pair(windows.run_blocks[run], windows.blocks_of(run));
+  });
 }
 
 // Of every block, the fold that it is held out with.  What a run has of its own, such as its
@@ -54,13 +50,18 @@ double weighted(const std::vector<double>& values, const std::vector<double>& ti
   return sum;
 }
 
-HeldOutGain interval_of(double mean, std::vector<double> drawn) {
-  std::sort(drawn.begin(), drawn.end());
-  const std::size_t tail = drawn.size() / 20;
-  return {mean, drawn[tail], drawn[drawn.size() - 1 - tail]};
+HeldOutGain with_interval(double mean, std::vector<double> drawn) {
+  const auto [lo, hi] = ninety_percent_of(std::move(drawn));
+  return {mean, lo, hi};
 }
 
 }  // namespace
+
+Interval ninety_percent_of(std::vector<double> drawn) {
+  std::sort(drawn.begin(), drawn.end());
+  const std::size_t tail = drawn.size() / 20;
+  return {drawn[tail], drawn[drawn.size() - 1 - tail]};
+}
 
 std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
                                          const std::vector<FitRow>& rows,
@@ -119,7 +120,7 @@ HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const
   }
   double sum = 0;
   for (const double gain : gains) sum += gain;
-  return interval_of(sum / static_cast<double>(with.nats.size()), std::move(drawn));
+  return with_interval(sum / static_cast<double>(with.nats.size()), std::move(drawn));
 }
 
 HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
@@ -135,7 +136,7 @@ HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const 
     drawn.push_back(share(weighted(gained, times), weighted(gap, times)));
   }
   const std::vector<double> once(gained.size(), 1.0);
-  return interval_of(share(weighted(gained, once), weighted(gap, once)), std::move(drawn));
+  return with_interval(share(weighted(gained, once), weighted(gap, once)), std::move(drawn));
 }
 
 }  // namespace gapfarm

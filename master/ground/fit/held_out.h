@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/base/interval.h"
 #include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
@@ -23,6 +24,9 @@ WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& ro
 // blocks as it has; together they count as n.
 std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint64_t seed,
                                              std::size_t spared);
+
+// What nine in ten of some draws lie within.
+Interval ninety_percent_of(std::vector<double> drawn);
 
 // Nats a window, with a 90 % interval by runs and blocks drawn again.
 struct HeldOutGain {

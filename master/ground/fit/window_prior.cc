@@ -184,10 +184,10 @@ Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t see
     for (Eigen::Index d = 0; d < drawn.cols(); ++d) {
       row[d] = drawn(k, d) - (a >= 0 ? reference_->draws(a, d) : 0);
     }
-    std::sort(row.begin(), row.end());
+    const auto [lo, hi] = ninety_percent_of(std::move(row));
     // Where the draws lead away from the fit, it has not settled: it is no surer than that.
-    bounds(k, 0) = std::min(row[kGroundDraws / 20], fit.values[k]);
-    bounds(k, 1) = std::max(row[kGroundDraws - 1 - kGroundDraws / 20], fit.values[k]);
+    bounds(k, 0) = std::min(lo, fit.values[k]);
+    bounds(k, 1) = std::max(hi, fit.values[k]);
   }
   return bounds;
 }

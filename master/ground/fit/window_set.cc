@@ -31,8 +31,7 @@ bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Tr
 }
 
 std::size_t pose_at(const LoggedRun& run, double t_s) {
-  const auto found = std::lower_bound(run.poses.begin(), run.poses.end(), t_s - 1e-9,
-                                      [](const PoseRow& p, double t) { return p.t_s < t; });
+  const auto found = std::ranges::lower_bound(run.poses, t_s - 1e-9, {}, &PoseRow::t_s);
   const auto at = static_cast<std::size_t>(found - run.poses.begin());
   return std::min(at, run.poses.size() - 1);
 }
@@ -55,8 +54,7 @@ std::optional<Eigen::Matrix3d> noise_of_window(const LoggedRun& run, const Trial
 // What a gyro turned by between two times, its rates straight on between; none over a gap.
 std::optional<double> turned_between(const std::vector<CommandRow>& rates, double from_s,
                                      double end_s) {
-  const auto first = std::upper_bound(rates.begin(), rates.end(), from_s,
-                                      [](double t, const CommandRow& r) { return t < r.t_s; });
+  const auto first = std::ranges::upper_bound(rates, from_s, {}, &CommandRow::t_s);
   if (first == rates.begin() || rates.empty() || rates.back().t_s < end_s) return {};
   double turned = 0;
   for (auto row = first - 1; row + 1 != rates.end() && row->t_s < end_s; ++row) {
@@ -174,7 +172,7 @@ void add_blocks(const RunLog& log, WindowSet* set) {
   for (std::size_t i = 0; i < set->trials.size(); ++i) {
     const Trial& trial = set->trials[i];
     const std::size_t run = set->run_of[i];
-    const int pieces = (run + 1 < first.size() ? first[run + 1] : set->blocks) - first[run];
+    const int pieces = set->blocks_of(run);
     const double middle = *trial.t_s + *trial.duration_s / 2 - begin[run];
     const int piece = static_cast<int>(pieces * middle / std::max(length[run], 1e-9));
     set->block.push_back(first[run] + std::clamp(piece, 0, pieces - 1));

@@ -55,6 +55,9 @@ struct WindowSet {
     return horizon[trial] < horizons - static_cast<int>(returns.size()) ? Sense::kGyro
                                                                         : Sense::kReturn;
   }
+  int blocks_of(std::size_t run) const {
+    return (run + 1 < run_blocks.size() ? run_blocks[run + 1] : blocks) - run_blocks[run];
+  }
   // Windows of poses a horizon: how often the log says something anew.
   double stretches() const;
 };

@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "common/base/ranges.h"
+#include "common/math/statistics.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
@@ -41,9 +42,6 @@ class GroundReport {
   NamedEffect effect_of(const GroundStep& step, std::size_t place);
   void name_headline();
   void judge();
-  static double sum(const std::vector<double>& nats) {
-    return std::accumulate(nats.begin(), nats.end(), 0.0) / static_cast<double>(nats.size());
-  }
   // Of components of the residuals, in thousandths.
   double rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Index count) const;
   double rms_mm(const WindowFit& fit) const { return rms_of(fit, 0, 2); }
@@ -71,8 +69,7 @@ double GroundReport::rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Ind
 
 void add_alias(const std::string& name, NamedEffect* effect) {
   if (name == effect->name || effect->aliases.size() >= kMostAliases) return;
-  const auto& have = effect->aliases;
-  if (std::find(have.begin(), have.end(), name) == have.end()) effect->aliases.push_back(name);
+  if (!contains(effect->aliases, name)) effect->aliases.push_back(name);
 }
 
 NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
@@ -92,11 +89,11 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
           estimate_of(row, search_.fit.values[j], intervals_(j, 0), intervals_(j, 1)));
     }
   }
-  const double floor = sum(search_.best.nats);
+  const double floor = mean(search_.best.nats);
   const WindowFit& before = step.before;
   const WindowFit& after = search_.chain[place + 1];
-  effect.gap_before = floor - sum(before.nats);
-  effect.gap_after = floor - sum(after.nats);
+  effect.gap_before = floor - mean(before.nats);
+  effect.gap_after = floor - mean(after.nats);
   effect.position_mm_before = rms_mm(before);
   effect.position_mm_after = rms_mm(after);
   effect.heading_mrad_before = rms_mrad(before);
@@ -175,12 +172,11 @@ void GroundReport::values() {
 }
 
 void GroundReport::figures() {
-  const double floor = sum(search_.best.nats);
-  d_.gap = {floor - sum(search_.chain.front().nats), floor - sum(search_.chain.back().nats), 0};
-  d_.position_mm = {rms_mm(search_.chain.front()), rms_mm(search_.chain.back()),
-                    rms_mm(search_.best)};
-  d_.heading_mrad = {rms_mrad(search_.chain.front()), rms_mrad(search_.chain.back()),
-                     rms_mrad(search_.best)};
+  const double floor = mean(search_.best.nats);
+  const WindowFit &file = search_.chain.front(), &named = search_.chain.back();
+  d_.gap = {floor - mean(file.nats), floor - mean(named.nats), 0};
+  d_.position_mm = {rms_mm(file), rms_mm(named), rms_mm(search_.best)};
+  d_.heading_mrad = {rms_mrad(file), rms_mrad(named), rms_mrad(search_.best)};
   if (search_.reference) {
     d_.cautions.push_back(
         "Against the reference's log: sizes and intervals are of the change, what the reference "
