@@ -10,6 +10,19 @@ namespace {
 constexpr double kAbsorbed = 1e-4;       // of a column's squares: no longer its own
 constexpr double kWeakDirection = 0.02;  // of the strongest singular value
 
+// What cut columns explain of the data; directions of fewer squares than `least` do not count.
+Gain gain_of(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, double least, double expected) {
+  const SymmetricAxes eigen = axes_of_symmetric(c.transpose() * c);
+  const Eigen::VectorXd b = eigen.vectors.transpose() * (c.transpose() * left);
+  Gain gain;
+  for (Eigen::Index i = 0; i < b.size(); ++i) {
+    if (eigen.values[i] <= least) continue;
+    gain.squares += b[i] * b[i] / eigen.values[i] / (1 + expected * expected * eigen.values[i]);
+    ++gain.dimensions;
+  }
+  return gain;
+}
+
 }  // namespace
 
 Regression::Regression(const Eigen::MatrixXd& nuisances, const Eigen::VectorXd& data)
@@ -42,32 +55,14 @@ Eigen::MatrixXd Regression::cut(const Eigen::MatrixXd& columns) const {
 
 Gain Regression::gain(const Eigen::MatrixXd& columns) const {
   const Eigen::MatrixXd c = cut(columns);
-  if (c.cols() == 0) return {};
-  const SymmetricAxes eigen = axes_of_symmetric(c.transpose() * c);
-  const Eigen::VectorXd b = eigen.vectors.transpose() * (c.transpose() * left_);
-  Gain gain;
-  for (Eigen::Index i = 0; i < b.size(); ++i) {
-    if (eigen.values[i] <= kAbsorbed) continue;
-    gain.squares += b[i] * b[i] / eigen.values[i];
-    ++gain.dimensions;
-  }
-  return gain;
+  return c.cols() == 0 ? Gain() : gain_of(c, left_, kAbsorbed, 0);
 }
 
 Gain Regression::gain_beyond(const Eigen::MatrixXd& columns, double expected) const {
   Eigen::MatrixXd c = Eigen::MatrixXd::Zero(basis_.rows(), columns.cols());
   c.topRows(rows_) = columns;
   c -= basis_ * (basis_.transpose() * c);
-  const SymmetricAxes eigen = axes_of_symmetric(c.transpose() * c);
-  const Eigen::VectorXd b = eigen.vectors.transpose() * (c.transpose() * left_);
-  const double least = kAbsorbed * columns.colwise().squaredNorm().mean();
-  Gain gain;
-  for (Eigen::Index i = 0; i < b.size(); ++i) {
-    if (eigen.values[i] <= least) continue;
-    gain.squares += b[i] * b[i] / eigen.values[i] / (1 + expected * expected * eigen.values[i]);
-    ++gain.dimensions;
-  }
-  return gain;
+  return gain_of(c, left_, kAbsorbed * columns.colwise().squaredNorm().mean(), expected);
 }
 
 Eigen::VectorXd Regression::each_gain(const Eigen::MatrixXd& columns) const {
