@@ -140,12 +140,7 @@ Error Predictor::failed(const std::string& what) const {
 Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::attempt(
     const std::vector<PredictionRequest>& requests) {
   std::vector<std::optional<Error>> errors;
-  auto all = simulate(hash_, requests, &errors);
-  if (!all) return all.error();
-  for (const std::optional<Error>& error : errors) {
-    if (error) last_failure_ = error->message;
-  }
-  return all;
+  return simulate(hash_, requests, &errors);
 }
 
 Result<std::optional<std::vector<Pose>>> Predictor::attempt_slower(const Overrides& at,
@@ -153,7 +148,6 @@ Result<std::optional<std::vector<Pose>>> Predictor::attempt_slower(const Overrid
   std::vector<std::optional<Error>> errors;
   auto all = simulate(farm_.add_problem(to_proto(slower(problem_, factor))), {{at, {}}}, &errors);
   if (!all) return all.error();
-  if (errors.front()) last_failure_ = errors.front()->message;
   return std::move(all->front());
 }
 
@@ -203,6 +197,9 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
       }
       (*ends[k])[place] = from_proto(result.predict().predictions(i).end());
     }
+  }
+  for (const std::optional<Error>& error : *errors) {
+    if (error) last_failure_ = error->message;
   }
   return ends;
 }
