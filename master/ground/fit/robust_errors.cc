@@ -127,9 +127,10 @@ bool commanded_alike(const CommandedRun& a, const CommandedRun& b) {
 
 // Of each of these runs, where it is among what is held out: counted from 0 on, repeats alike.
 std::map<std::size_t, std::size_t> places_of(const std::map<std::size_t, std::array<double, 2>>& of,
-                                             std::span<const CommandedRun> runs, bool repeats) {
+                                             std::span<const CommandedRun> runs, bool repeats,
+                                             std::size_t* different) {
   std::map<std::size_t, std::size_t> places;
-  std::size_t count = 0;
+  std::size_t& count = *different = 0;
   for (const auto& [run, span] : of) {
     const auto like = std::ranges::find_if(places, [&](const auto& known) {
       return repeats && commanded_alike(runs[known.first], runs[run]);
@@ -139,20 +140,14 @@ std::map<std::size_t, std::size_t> places_of(const std::map<std::size_t, std::ar
   return places;
 }
 
-std::size_t count_of(const std::map<std::size_t, std::size_t>& places) {
-  std::size_t count = 0;
-  for (const auto& [run, place] : places) count = std::max(count, place + 1);
-  return count;
-}
-
 }  // namespace
 
 std::vector<std::size_t> held_out_stretches(std::span<const Trial> windows,
                                             std::span<const CommandedRun> runs, std::size_t count) {
   const auto span_s = spans_of(windows);
-  std::map<std::size_t, std::size_t> places = places_of(span_s, runs, true);
-  if (count_of(places) < kEnoughRuns) places = places_of(span_s, runs, false);
-  const std::size_t units = count_of(places);
+  std::size_t units = 0;
+  std::map<std::size_t, std::size_t> places = places_of(span_s, runs, true, &units);
+  if (units < kEnoughRuns) places = places_of(span_s, runs, false, &units);
   if (units < kEnoughRuns) return equal_parts(windows, count);
   count = std::min(count, units);
   std::vector<std::size_t> stretches;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/score/kinematic_start.h"
@@ -48,12 +49,9 @@ Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::v
   for (std::size_t k = 0; k < looks->size(); ++k) {
     const std::optional<At>& look = (*looks)[k];
     if (!look) continue;
-    NormalEquations equations = normal_equations(*errors_, look->ends, first.slopes);
-    const NormalEquations prior = prior_at(look->genome, holds[k]);
-    equations.H += prior.H;
-    equations.g += prior.g;
+    NormalEquations equations = equations_at(*look, holds[k], first.slopes);
     for (std::size_t j = 0; j < fitted_rows_.size(); ++j) {
-      if (std::find(untold_.begin(), untold_.end(), fitted_rows_[j]) == untold_.end()) continue;
+      if (!contains(untold_, fitted_rows_[j])) continue;
       const auto row = static_cast<Eigen::Index>(j);
       equations.H.row(row).setZero();
       equations.H.col(row).setZero();
@@ -84,7 +82,7 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   }
   for (std::size_t k = 0; k < looks.size(); ++k) {
     std::optional<At>& look = looks[k];
-    if (look) climbs.push_back({std::move(*look), holds[k], {}, {}, {}, false});
+    if (look) climbs.push_back({std::move(*look), holds[k]});
   }
   std::stable_sort(climbs.begin(), climbs.end(),
                    [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; });
@@ -141,7 +139,7 @@ Result<std::optional<Climb>> SimulationFit::firm_climb() {
   const Hold hold{firm_, 1, kFirmly};
   ASSIGN_OR_RETURN(auto look, look_at({firm_}, {hold}));
   if (!look.front()) return std::optional<Climb>();
-  Climb climb{*std::move(look.front()), hold, {}, {}, {}, false};
+  Climb climb{*std::move(look.front()), hold};
   if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
   return std::optional(std::move(climb));
 }
@@ -285,11 +283,9 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   errors_->emphasise(std::vector<std::array<double, 2>>(errors_->lengths(), {1, kHeadingCounts}));
   baseline_ = kinematic_held_out(problem_, kinematics_, *plain_, stretches_);
   const ParameterValues values = kinematic_start(problem_, kinematics_);
-  for (const Gene& gene : problem_.genes) {
-    start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
-  }
   const ParameterValues grip = without_slip(problem_, values);
   for (const Gene& gene : problem_.genes) {
+    start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
     firm_.push_back(encode_gene(problem_.table(), gene, grip[gene.row]));
   }
   const Hold hold{start_, 1};
@@ -299,7 +295,7 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   found.simulations = simulations_;
   if (!first.front() || fitted_rows_.empty()) return found;
   const At begin = *first.front();
-  std::vector<Climb> climbs = {{begin, hold, {}, {}, {}, false}};
+  std::vector<Climb> climbs = {{begin, hold}};
   if (Status s = step(&climbs.front()); !s) return s.error();
   found.simulations = simulations_;
   if (climbs.front().slopes.empty()) return found;

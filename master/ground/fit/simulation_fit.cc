@@ -123,11 +123,13 @@ Genome SimulationFit::with_fitted_values(const Genome& genome,
   return to;
 }
 
-void SimulationFit::make_equations(Climb* climb) const {
-  climb->equations = normal_equations(*errors_, climb->at.ends, climb->slopes);
-  const NormalEquations prior = prior_at(climb->at.genome, climb->hold);
-  climb->equations.H += prior.H;
-  climb->equations.g += prior.g;
+NormalEquations SimulationFit::equations_at(const At& at, const Hold& hold,
+                                            const WindowSlopes& slopes) const {
+  NormalEquations equations = normal_equations(*errors_, at.ends, slopes);
+  const NormalEquations prior = prior_at(at.genome, hold);
+  equations.H += prior.H;
+  equations.g += prior.g;
+  return equations;
 }
 
 Status SimulationFit::look_round(Climb* climb) {
@@ -192,12 +194,12 @@ Result<double> SimulationFit::try_steps(Climb* climb, std::span<const double> da
 // the usual do not help.
 Status SimulationFit::step(Climb* climb) {
   if (!climb->slopes.empty() && climb->sloped != climb->at.genome) {
-    make_equations(climb);
+    climb->equations = equations_at(climb->at, climb->hold, climb->slopes);
     ASSIGN_OR_RETURN(const auto gained, try_steps(climb, kDampings));
     if (gained >= kEnoughNats) return {};
   }
   if (Status s = look_round(climb); !s || climb->over) return s;
-  make_equations(climb);
+  climb->equations = equations_at(climb->at, climb->hold, climb->slopes);
   const bool worth_more = promised(*climb) >= kEnoughNats;
   auto gained = try_steps(climb, kDampings);
   if (gained && *gained == 0 && worth_more) gained = try_steps(climb, kGreatDampings);

@@ -30,9 +30,9 @@ struct Hold {
 struct Climb {
   At at;
   Hold hold;
-  WindowSlopes slopes;  // at `sloped`, where it stands or stood some steps before
-  Genome sloped;
-  NormalEquations equations;
+  WindowSlopes slopes = {};  // at `sloped`, where it stands or stood some steps before
+  Genome sloped = {};
+  NormalEquations equations = {};
   bool over = false;
 };
 
@@ -53,7 +53,8 @@ class SimulationFit {
                                                  const std::vector<Hold>& holds);
   Status look_round(Climb* climb);  // slopes where it stands, unless they are known
   void correct_slopes(const At& before, Climb* climb) const;
-  void make_equations(Climb* climb) const;
+  // Of the windows, and of what was moved.
+  NormalEquations equations_at(const At& at, const Hold& hold, const WindowSlopes& slopes) const;
   double promised(const Climb& climb) const;  // nats, of a step
   Result<double> try_steps(Climb* climb, std::span<const double> dampings);
   Status step(Climb* climb);
