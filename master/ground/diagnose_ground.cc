@@ -57,16 +57,6 @@ Status exclude(const std::vector<std::string>& names, std::vector<GroundHypothes
   return {};
 }
 
-// What lies before measured wheel speeds is not the file's.
-void leave_motors_out(Kinematics* values) {
-  Kinematics kept;
-  for (std::size_t k = 0; k < values->names.size(); ++k) {
-    if (values->names[k] == "lag" || values->names[k] == "delay") continue;
-    kept.add(values->names[k], values->values[static_cast<Eigen::Index>(k)]);
-  }
-  *values = std::move(kept);
-}
-
 // The file's robot, driven as `driven` is.
 Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, RunLog log,
                                         const GroundDiagnoseOptions& options,
@@ -92,9 +82,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
   search.loop = loop;
   clock.begin(std::end(kGroundStages)[-1].name);
   GroundDiagnosis result = report_ground(robot, search, options);
-  Kinematics chosen = chosen_values(search);
-  if (loop) leave_motors_out(&chosen);
-  result.corrected = robot_with(file, chosen);
+  result.corrected = robot_with(file, chosen_values(search));
   clock.begin("");
   result.diagnosis.timing_s = std::move(clock.timing_s);
   return result;
@@ -221,13 +209,10 @@ void emit_steps(const GroundWork& work, const GroundSearch& search) {
 
 void emit_rest(const GroundWork& work, const GroundSearch& search) {
   if (!work.on_finding) return;
-  Finding finding;
-  finding.about = "what is left";
   GroundFigures figures;
   figures.closable = search.closable;
   figures.best_of_all = search.best_of_all;
-  finding.text = verdict_reason(figures);
-  work.on_finding(std::move(finding));
+  work.on_finding({"what is left", verdict_reason(figures), {}, {}});
 }
 
 }  // namespace gapfarm

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/progress/overall_progress.h"
 #include "common/recordings/run.h"
 #include "common/recordings/windows.h"
 #include "common/robot/robot.h"
@@ -27,15 +28,11 @@ struct GroundDiagnoseOptions : GroundWork {
 };
 
 // Every stage in its order, with its share of the time, for progress.
-struct GroundStage {
-  const char* name;
-  double share;
-};
-inline constexpr GroundStage kGroundStages[] = {{"fit the reference", 0.2},
-                                                {kFaultStage, 0.1},
-                                                {kCatalogueStage, 0.5},
-                                                {kRestStage, 0.1},
-                                                {"predict what was not fitted", 0.3}};
+inline const ProgressStage kGroundStages[] = {{"fit the reference", 0.2},
+                                              {kFaultStage, 0.1},
+                                              {kCatalogueStage, 0.5},
+                                              {kRestStage, 0.1},
+                                              {"predict what was not fitted", 0.3}};
 
 struct GroundDiagnosis {
   Diagnosis diagnosis;

@@ -29,15 +29,6 @@ std::vector<std::pair<std::size_t, std::size_t>> channel_pairs(const GroundRobot
   return pairs;
 }
 
-using CommandChange = std::function<void(std::vector<double>&)>;
-
-std::function<void(RunLog*)> change_commands(CommandChange change) {
-  return [change = std::move(change)](RunLog* log) {
-    for (LoggedRun& run : log->runs) {
-      for (CommandRow& row : run.commands) change(row.values);
-    }
-  };
-}
 // L (x, y, theta), the heading `turn` (rad) less; of relative poses L of each increment, whose
 // noise goes with it.
 std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn = 0) {
@@ -82,8 +73,8 @@ class Catalogue {
   }
   void value(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
              std::vector<KinematicRow> freed) {
-    const double price = kPriceOfAValue * (static_cast<double>(freed.size()) - 1);
-    all.push_back({name, std::move(aliases), thing, std::move(freed), {}, 1, "", false, price});
+    all.push_back({name, std::move(aliases), thing, std::move(freed)});
+    all.back().price = kPriceOfAValue * (static_cast<double>(all.back().freed.size()) - 1);
   }
   void more(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
             std::vector<KinematicRow> freed) {
@@ -93,8 +84,7 @@ class Catalogue {
   void fault(const std::string& name, const std::string& thing, const std::string& remedy,
              std::function<void(RunLog*)> put_right, double metres = 1,
              std::vector<std::string> aliases = {}) {
-    all.push_back(
-        {name, std::move(aliases), thing, {}, std::move(put_right), metres, remedy, false});
+    all.push_back({name, std::move(aliases), thing, {}, std::move(put_right), metres, remedy});
   }
 
   const GroundRobot& robot_;
@@ -318,6 +308,14 @@ void Catalogue::floors() {
 
 }  // namespace
 
+std::function<void(RunLog*)> change_commands(std::function<void(std::vector<double>&)> change) {
+  return [change = std::move(change)](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      for (CommandRow& row : run.commands) change(row.values);
+    }
+  };
+}
+
 std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
                                                 const std::vector<KinematicRow>& rows) {
   Catalogue catalogue(robot, rows);
@@ -378,7 +376,7 @@ std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<Groun
     h.remedy += " If it is " + other + ", turn the signs of y and theta instead.";
     h.aliases.emplace_back(log.relative ? "sensor_upside_down" : "axes_mirrored");
   }
-  GroundHypothesis gyro{kGyroScale, {}, "the scale of the gyro", {}, {}, 1, "", false};
+  GroundHypothesis gyro{kGyroScale, {}, "the scale of the gyro", {}};
   add_gyro_scale(log, &gyro.freed);
   if (!gyro.freed.empty()) all.push_back(std::move(gyro));
   return all;

@@ -30,14 +30,17 @@ struct GroundHypothesis {
   std::string thing;                 // "the radius of the right wheels"
   std::vector<KinematicRow> freed;
   // A log that is the wrong way round or in another unit, put right; empty: nothing to put right.
-  std::function<void(RunLog*)> put_right;
+  std::function<void(RunLog*)> put_right = {};
   double metres = 1;  // logged positions times this are metres
-  std::string remedy;
+  std::string remedy = {};
   bool only_more = false;  // less than 0 has no meaning
   double price = 0;        // nats that it must gain more, having more values than others
   bool of_world = false;   // acts in a place or along an axis of the world
   double radians = 1;      // logged headings times this are radians
 };
+
+// Changes the values of every row of commands.
+std::function<void(RunLog*)> change_commands(std::function<void(std::vector<double>&)> change);
 
 // Standard deviation of a value that is wrong (kPlausibleErrors).
 double plausible_error(const KinematicRow& row);

@@ -1,8 +1,11 @@
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "master/ground/search.h"
@@ -10,12 +13,6 @@
 
 namespace gapfarm {
 namespace {
-
-std::vector<FitRow> held_rows(const GroundQuestion& question) {
-  std::vector<FitRow> rows;
-  for (const KinematicRow& row : question.rows) rows.push_back({row, false});
-  return rows;
-}
 
 constexpr std::size_t kMostRuns = 9;
 constexpr int kClockSteps = 15;        // either way
@@ -70,7 +67,7 @@ std::optional<GroundFault> best_fault(
 std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
                                              const GroundQuestion& question,
                                              const WindowSettings& settings) {
-  const std::vector<FitRow> rows = held_rows(question);
+  const std::vector<FitRow> rows = held_rows(question.rows);
   const auto objective_of = [&](const WindowFitter& fitter, const RunLog&) {
     return fitter.hold(rows, nominals(rows)).objective;
   };
@@ -126,7 +123,7 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
         settled ? std::nullopt : find_ground_fault(robot, search->log, question, work.windows);
     ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, work.windows));
     search->windows = std::move(windows);
-    search->rows = held_rows(question);
+    search->rows = held_rows(question.rows);
     const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
     search->fit = fitter.fit(search->rows);
     // Values a little off must not do as well.
@@ -144,24 +141,16 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
   return {};
 }
 
-bool names_stale_frames(const GroundSearch& search) { return search.stale.lo >= kLeastStaleShare; }
-
-bool names_rounding(const GroundSearch& search) {
-  if (search.grid.step_m <= 0) return false;
-  // Of the difference of two rounded positions.
-  const double rounding_m = search.grid.step_m / std::sqrt(6.0);
-  return rounding_m >= kLeastRounding * search.free_fit.scales.front().head<2>().minCoeff();
-}
-
-std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit) {
-  const WindowSet& windows = fitter.windows();
+std::string far_runs(const GroundSearch& search) {
+  const WindowSet& windows = search.windows;
+  const WindowFit& fit = search.fit;
   const std::vector<std::size_t>& run = windows.run_of;
   std::vector<std::vector<double>> misses(windows.run_blocks.size());
   for (std::size_t i = 0; i < run.size(); ++i) {
     const Eigen::Vector3d& scale = fit.scales[static_cast<std::size_t>(windows.horizon[i])];
     misses[run[i]].push_back(fit.residuals[i].cwiseQuotient(scale).norm());
   }
-  std::vector<FarRun> far;
+  std::vector<std::string> far;
   for (std::size_t r = 0; r < misses.size(); ++r) {
     std::vector<double> others;
     for (std::size_t other = 0; other < misses.size(); ++other) {
@@ -169,9 +158,11 @@ std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit) {
     }
     if (misses[r].empty() || others.size() < 2) continue;
     const double times = median(misses[r]) / std::max(median(others), 1e-12);
-    if (times > kFarRun) far.push_back({r, times});
+    if (!(times > kFarRun)) continue;
+    far.push_back(fmt::format("Run {} misses by {:.0f} times as much as the others.",
+                              search.log.runs[r].run, times));
   }
-  return far;
+  return joined(far, " ");
 }
 
 double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {

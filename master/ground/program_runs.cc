@@ -189,21 +189,6 @@ double root_mean_square(const RunLog& log, std::size_t channel) {
   return std::sqrt(sum / count);
 }
 
-GroundHypothesis exchanged(const std::string& a, const std::string& b, std::size_t i,
-                           std::size_t k) {
-  return {"channels_swapped",
-          {"sides_swapped"},
-          a + " and " + b + " of the commands",
-          {},
-          [i, k](RunLog* log) {
-            for (LoggedRun& run : log->runs) {
-              for (CommandRow& row : run.commands) std::swap(row.values[i], row.values[k]);
-            }
-          },
-          1,
-          "Swap these two columns of the commands."};
-}
-
 GroundQuestion question_of_program(const Problem& problem, const GroundRobot& robot,
                                    const std::vector<KinematicRow>& tuned, const RunLog& log) {
   GroundQuestion question;
@@ -227,22 +212,20 @@ GroundQuestion question_of_program(const Problem& problem, const GroundRobot& ro
     const KinematicRow offset =
         channel_row(problem, channels[c], kChannelOffset, kChannelOffsetShare * size);
     question.rows.push_back(gain);
-    question.catalogue.push_back({"command_gain",
-                                  {"command_units"},
-                                  "the gain of " + channels[c] + " of the commands",
-                                  {gain},
-                                  {},
-                                  1,
-                                  ""});
-    question.catalogue.push_back({"command_offset",
-                                  {},
-                                  "what is added to " + channels[c] + " of the commands",
-                                  {offset},
-                                  {},
-                                  1,
-                                  ""});
+    const std::string whose = channels[c] + " of the commands";
+    question.catalogue.push_back(
+        {"command_gain", {"command_units"}, "the gain of " + whose, {gain}});
+    question.catalogue.push_back({"command_offset", {}, "what is added to " + whose, {offset}});
     for (std::size_t k = c + 1; k < channels.size(); ++k) {
-      question.catalogue.push_back(exchanged(channels[c], channels[k], c, k));
+      question.catalogue.push_back({"channels_swapped",
+                                    {"sides_swapped"},
+                                    channels[c] + " and " + channels[k] + " of the commands",
+                                    {},
+                                    change_commands([c, k](std::vector<double>& values) {
+                                      std::swap(values[c], values[k]);
+                                    }),
+                                    1,
+                                    "Swap these two columns of the commands."});
     }
   }
   // The rows of one value are the same to the digit wherever they stand.
@@ -288,9 +271,7 @@ Status tune_program(Farm& farm, const RunLog& log, const WindowSettings& setting
   question.simulation = [&](const WindowSet& windows) { return program.simulation(windows); };
   const GroundRobot robot = robot_of(*problem, program.X_RM());
   ASSIGN_OR_RETURN(const auto windows, question.windows(robot, log, settings));
-  std::vector<FitRow> free;
-  for (const KinematicRow& row : *rows) free.push_back({row, false});
-  const WindowFit fit = WindowFitter(robot, windows).fit(free);
+  const WindowFit fit = WindowFitter(robot, windows).fit(held_rows(*rows));
   RETURN_IF_ERROR(program.failure());
   for (std::size_t k = 0; k < rows->size(); ++k) {
     KinematicRow& row = (*rows)[k];

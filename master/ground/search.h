@@ -138,10 +138,6 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
 Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
                                    const GroundQuestion& question, const GroundWork& work);
 
-// What the poses show by themselves, where it matters.
-bool names_stale_frames(const GroundSearch& search);
-bool names_rounding(const GroundSearch& search);
-
 // The best of some values, each as it is with scales of its own, and of those that `most` nats are
 // of.
 Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
@@ -157,14 +153,10 @@ Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,
                                Eigen::VectorXd* values);
 
-struct FarRun {
-  std::size_t run = 0;  // in the log
-  double times = 1;     // what the other runs miss by
-};
-
 // Of three runs or more those whose windows miss by far more than the others' (kFarRun), medians
-// of each: commands of another run, a world that is mirrored in this one alone.
-std::vector<FarRun> far_runs(const WindowFitter& fitter, const WindowFit& fit);
+// of each: commands of another run, a world that is mirrored in this one alone.  "Run 3 misses by
+// 12 times as much as the others.", one sentence a run; empty: none.
+std::string far_runs(const GroundSearch& search);
 
 // How much of what motions differ by a fit leaves, mean absolute values, of the component of the
 // ends that it explains best: near 1 where commands have nothing to do with how the robot moved.

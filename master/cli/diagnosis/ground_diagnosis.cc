@@ -12,6 +12,7 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/fit_file.h"
+#include "master/ground/fit/window_prior.h"
 #include "master/ground/program_runs.h"
 #include "master/report/report_html.h"
 
@@ -21,12 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFits = "fits.jsonl";
-
-std::vector<ProgressStage> ground_stages() {
-  std::vector<ProgressStage> all;
-  for (const GroundStage& stage : kGroundStages) all.push_back({stage.name, stage.share});
-  return all;
-}
 
 // The folders of a log, or those that a run's model was fitted to.
 Result<std::vector<std::string>> reference_folders(const std::vector<std::string>& named,
@@ -75,14 +70,8 @@ std::string log_hash(const RunLog& log) {
   Hasher hasher;
   for (const LoggedRun& run : log.runs) {
     hasher.add(run.session).add(run.run);
-    for (const CommandRow& row : run.commands) {
-      hasher.add(row.t_s);
-      for (const double value : row.values) hasher.add(value);
-    }
-    for (const CommandRow& row : run.wheel_speeds) {
-      hasher.add(row.t_s);
-      for (const double value : row.values) hasher.add(value);
-    }
+    add_rows(run.commands, &hasher);
+    add_rows(run.wheel_speeds, &hasher);
     for (const PoseRow& row : run.poses) {
       hasher.add(row.t_s).add(row.X_WM.x).add(row.X_WM.y).add(row.X_WM.theta);
     }
@@ -97,7 +86,8 @@ Result<int> run_diagnose_runs(DiagnoseCommand& command, const Config& config,
   const bool kinematic = config.problem.ground != nullptr;
   Problem problem = config.problem;
   ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, problem.channels()));
-  RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, ground_stages(), context));
+  RETURN_IF_ERROR(LongCommand::begin(
+      "diagnose", {command.out}, {std::begin(kGroundStages), std::end(kGroundStages)}, context));
   ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
   const fs::path out(command.out);
   RETURN_IF_ERROR(command.outputs.write((out / kStampFile).string(), stamp));

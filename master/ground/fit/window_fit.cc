@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/score/kinematic.h"
 #include "master/ground/fit/window_prior.h"
@@ -43,6 +44,10 @@ Eigen::Index row_index(const std::vector<FitRow>& rows, std::string_view name) {
   const auto found =
       std::ranges::find(rows, name, [](const FitRow& r) -> std::string_view { return r.row.name; });
   return found == rows.end() ? -1 : found - rows.begin();
+}
+
+std::vector<FitRow> held_rows(const std::vector<KinematicRow>& rows) {
+  return mapped(rows, [](const KinematicRow& row) { return FitRow{row}; });
 }
 
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {

@@ -25,6 +25,9 @@ double prior_deviation(const FitRow& row);
 // Where a row of this name stands; -1: nowhere.
 Eigen::Index row_index(const std::vector<FitRow>& rows, std::string_view name);
 
+// Each within its tolerance.
+std::vector<FitRow> held_rows(const std::vector<KinematicRow>& rows);
+
 // Where they stand as long as no log has its say.
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows);
 

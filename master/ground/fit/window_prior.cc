@@ -30,10 +30,7 @@ std::string question_of(const GroundRobot& robot, const WindowSet& windows,
   hasher.add(format_robot(robot));
   for (const CommandedRun& run : windows.runs) {
     hasher.add(run.start_s).add(run.speed_m_s).add(run.turn_rad_s);
-    for (const CommandRow& row : run.commands) {
-      hasher.add(row.t_s);
-      for (const double value : row.values) hasher.add(value);
-    }
+    add_rows(run.commands, &hasher);
   }
   for (std::size_t i = 0; i < windows.trials.size(); ++i) {
     const Trial& trial = windows.trials[i];

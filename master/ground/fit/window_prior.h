@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "common/base/hash.h"
 #include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
@@ -17,6 +18,14 @@ inline double window_weight(double r, double s) {
 
 // Log density of a residual: Student's.
 double window_nats(double residual, double scale);
+
+// Times and values, into a hash.
+inline void add_rows(const std::vector<CommandRow>& rows, Hasher* hasher) {
+  for (const CommandRow& row : rows) {
+    hasher->add(row.t_s);
+    for (const double value : row.values) hasher->add(value);
+  }
+}
 
 // Hash of all that fits to these windows depend on beside rows and start.
 std::string question_of(const GroundRobot& robot, const WindowSet& windows,

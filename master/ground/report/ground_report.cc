@@ -147,16 +147,17 @@ void GroundReport::readings() {
     d_.effects.push_back(std::move(effect));
     ++figures_.faults;
   };
-  if (names_stale_frames(search_)) {
-    const StaleFrames& s = search_.stale;
+  if (const StaleFrames& s = search_.stale; s.lo >= kLeastStaleShare) {
     add("stale_frames", {"pose_latency"}, {"share", s.share, s.lo, s.hi, "-"},
         fmt::format("{} of {} poses on the way, {:.1f} % [{:.1f}, {:.1f}], repeat the one before; "
                     "they were held out.",
                     s.repeats, s.frames, 100 * s.share, 100 * s.lo, 100 * s.hi),
         "Log a pose once, with the time at which it was measured.");
   }
-  if (names_rounding(search_)) {
-    const PoseGrid& g = search_.grid;
+  const PoseGrid& g = search_.grid;
+  const double rounding_m = g.step_m / std::sqrt(6.0);  // of the difference of two positions
+  const double least_m = search_.free_fit.scales.front().head<2>().minCoeff();
+  if (g.step_m > 0 && rounding_m >= kLeastRounding * least_m) {
     add("pose_quantisation", {}, {"step", g.step_m, g.lo_m, g.hi_m, "m"},
         fmt::format("Positions are rounded to a grid of {:.4g} mm ({:.0f} nats).", 1e3 * g.step_m,
                     g.nats),
@@ -200,7 +201,7 @@ void GroundReport::judge() {
   figures_.faults += static_cast<int>(search_.faults.size());
   figures_.closable = search_.closable;
   figures_.best_of_all = search_.best_of_all;
-  figures_.far_runs = text_of_far_runs(search_, far_runs(fitter_, search_.fit));
+  figures_.far_runs = far_runs(search_);
   figures_.unexplained = search_.unexplained;
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
@@ -380,7 +381,12 @@ Kinematics chosen_values(const GroundSearch& search) {
     at.add(search.rows[j].row.name, search.fit.values[j]);
   }
   if (search.reference) search.reference->complete(&at);
-  return at;
+  Kinematics kept;
+  for (std::size_t k = 0; k < at.names.size(); ++k) {
+    if (search.loop && (at.names[k] == "lag" || at.names[k] == "delay")) continue;
+    kept.add(at.names[k], at.values[static_cast<Eigen::Index>(k)]);
+  }
+  return kept;
 }
 
 }  // namespace gapfarm

@@ -10,7 +10,7 @@ namespace gapfarm {
 GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
                               const GroundDiagnoseOptions& options);
 
-// What was chosen, as fitted.
+// What was chosen, as fitted; what lies before measured wheel speeds is not the file's.
 Kinematics chosen_values(const GroundSearch& search);
 
 }  // namespace gapfarm

@@ -311,13 +311,6 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
   return found;
 }
 
-std::string text_of_far_runs(const GroundSearch& search, const std::vector<FarRun>& far) {
-  return joined(far, " ", [&](const FarRun& o) {
-    return fmt::format("Run {} misses by {:.0f} times as much as the others.",
-                       search.log.runs[o.run].run, o.times);
-  });
-}
-
 std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& search,
                              std::uint64_t seed) {
   const WindowFit& fit = search.free_fit;

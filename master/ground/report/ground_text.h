@@ -73,9 +73,6 @@ std::string verdict_reason(const GroundFigures& figures);
 std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search,
                               const std::vector<double>& horizons_s);
 
-// "Run 3 misses by 12 times as much as the others.", one sentence a run; empty: none.
-std::string text_of_far_runs(const GroundSearch& search, const std::vector<FarRun>& far);
-
 // "These runs do not show whether these are right: the distance between the sides.", of values that
 // the log leaves as unsure as they were before it; empty: there are none.
 std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& search,
