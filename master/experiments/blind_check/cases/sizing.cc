@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "common/problem/problem.h"
+#include "common/score/fitness.h"
+#include "master/report/prediction_table.h"
 
 namespace gapfarm {
 namespace {
@@ -35,23 +37,6 @@ double draw_rest(const Parameter& p, const std::string& key, const Arena& arena,
     value = p.nominal * stream.uniform(0.5, 2);
   }
   return std::clamp(value, p.lower, p.upper);
-}
-
-Eigen::Matrix3d covariance_of(const v1::Predicted& p) {
-  Eigen::Matrix3d s;
-  s << p.cov(0), p.cov(1), p.cov(2),  //
-      p.cov(1), p.cov(3), p.cov(4),   //
-      p.cov(2), p.cov(4), p.cov(5);
-  return s;
-}
-
-// From axes that point at `angle` to the axes that they are measured in.
-Eigen::Matrix3d turned(const Eigen::Matrix3d& s, double angle) {
-  Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
-  r(0, 0) = r(1, 1) = std::cos(angle);
-  r(1, 0) = std::sin(angle);
-  r(0, 1) = -r(1, 0);
-  return r * s * r.transpose();
 }
 
 }  // namespace
@@ -100,14 +85,15 @@ std::optional<double> size_of(const v1::PredictResult& base, const v1::PredictRe
   for (int i = 0; i < base.predictions_size(); ++i) {
     const v1::Predicted& b = base.predictions(i);
     const v1::Predicted& e = effect.predictions(i);
-    const Eigen::Matrix3d s = covariance_of(b);
+    const Eigen::Matrix3d s = local_covariance(b);
     const Eigen::FullPivLU<Eigen::Matrix3d> lu(s);
     if (!lu.isInvertible()) return std::nullopt;
     const Pose X_WB = from_proto(b.end());
     const Pose X_WE = from_proto(e.end());
     const Eigen::Vector3d d = local_difference(X_WB, X_WE);
     if (by_spread) {
-      const Eigen::Matrix3d moment = turned(covariance_of(e), d[2]) + d * d.transpose();
+      const Eigen::Matrix3d moment =
+          rotate_covariance(local_covariance(e), d[2]) + d * d.transpose();
       sum += lu.solve(moment).trace() / 3;
     } else {
       sum += 1 + d.dot(lu.solve(d)) / 3;
