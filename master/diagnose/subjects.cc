@@ -7,7 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "common/parameters/push.h"
-#include "common/pose/pose.h"
+#include "common/pose/extent.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/free_commands.h"
@@ -123,19 +123,15 @@ constexpr std::array<double, 2> kLevels = {0.5, 1};  // of each command's own du
 
 // Places over the box around the log's own starts; the origin alone without a log.
 std::vector<Pose> starts_like(const TrialLog& log) {
-  double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
-  for (std::size_t i = 0; i < log.trials.size(); ++i) {
-    const Pose& X = log.trials[i].X_WS;
-    if (i == 0) x0 = x1 = X.x, y0 = y1 = X.y;
-    x0 = std::min(x0, X.x), x1 = std::max(x1, X.x);
-    y0 = std::min(y0, X.y), y1 = std::max(y1, X.y);
-  }
+  Extent box;
+  for (const Trial& trial : log.trials) box.add(trial.X_WS);
+  if (log.trials.empty()) box.add(Pose());
   std::vector<Pose> starts;
   for (int k = 0; k < kStarts; ++k) {
     // Steps of 2/5 in y against 1/5 in x: no two on a line with a side of the box.
     const double across = (k + 0.5) / kStarts;
     const double along = ((2 * k) % kStarts + 0.5) / kStarts;
-    starts.push_back({x0 + across * (x1 - x0), y0 + along * (y1 - y0),
+    starts.push_back({box.x0 + across * (box.x1 - box.x0), box.y0 + along * (box.y1 - box.y0),
                       wrap_angle(kFirstHeading + 2 * std::numbers::pi * k / kStarts)});
   }
   return starts;

@@ -7,6 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/pose/extent.h"
 #include "common/recordings/windows.h"
 #include "common/svg/svg.h"
 
@@ -50,9 +51,8 @@ Result<std::vector<Pose>> simulated_ends(Farm& farm, const Problem& problem) {
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
   const v1::TaskResult& result = results.front();
   RETURN_IF_ERROR(ended_well(result));
-  std::vector<Pose> ends;
-  for (const v1::Predicted& p : result.predict().predictions()) ends.push_back(from_proto(p.end()));
-  return ends;
+  return mapped(result.predict().predictions(),
+                [](const v1::Predicted& p) { return from_proto(p.end()); });
 }
 
 double middle_of(std::vector<double> values) {
@@ -77,18 +77,14 @@ struct Scale {
 };
 
 Scale scale_of(const DrivenPath& path, SvgPoint corner) {
-  double x0 = 1e9, x1 = -1e9, y0 = 1e9, y1 = -1e9;
+  Extent box;
   for (const auto* poses : {&path.logged, &path.before, &path.after}) {
-    for (const Pose& X : *poses) {
-      x0 = std::min(x0, X.x);
-      x1 = std::max(x1, X.x);
-      y0 = std::min(y0, X.y);
-      y1 = std::max(y1, X.y);
-    }
+    for (const Pose& X : *poses) box.add(X);
   }
   const double room = kPanel - 2 * kPad;
-  const double per_m = room / std::max({x1 - x0, y1 - y0, 1e-3});
-  return {{corner.x + kPad + (room - (x1 - x0) * per_m) / 2, corner.y + kPad}, x0, y1, per_m};
+  const double per_m = room / std::max(box.longer_side(), 1e-3);
+  const double beside = (room - (box.x1 - box.x0) * per_m) / 2;
+  return {{corner.x + kPad + beside, corner.y + kPad}, box.x0, box.y1, per_m};
 }
 
 void draw_path(const std::vector<Pose>& poses, const Scale& scale, const char* colour, double width,

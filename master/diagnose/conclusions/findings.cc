@@ -9,6 +9,7 @@
 #include "common/base/text.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
+#include "common/pose/extent.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/proposals.h"
@@ -190,15 +191,14 @@ LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Ce
   std::set<std::size_t> sessions, commands;
   std::set<int> sectors;
   std::set<long> durations, levels;
-  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+  Extent box;
   for (const ResidualTrial& t : trials) {
     sessions.insert(t.session);
     commands.insert(t.command);
     durations.insert(std::lround(1000 * cells[t.cell].command.duration_s));
     levels.insert(std::lround(1000 * cells[t.cell].level));
     sectors.insert(sector_of(t.X_WS.theta));
-    x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
-    y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
+    box.add(t.X_WS);
     v.longest_min = std::max(v.longest_min, t.context.session_time_s / 60);
     if (!t.context.moved) ++v.followers;
   }
@@ -207,7 +207,7 @@ LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Ce
   v.durations = durations.size();
   v.levels = levels.size();
   v.headings = sectors.size();
-  if (!trials.empty()) v.width_m = std::max(x1 - x0, y1 - y0);
+  if (!trials.empty()) v.width_m = box.longer_side();
   std::vector<double> counts;
   for (const Cell& cell : cells) {
     if (cell.trials > 0) counts.push_back(double(cell.trials));

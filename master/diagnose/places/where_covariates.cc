@@ -8,17 +8,15 @@
 
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
+#include "common/pose/extent.h"
 
 namespace gapfarm {
 namespace {
 
 std::vector<double> middle(std::span<const ResidualTrial> trials) {
-  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
-  for (const ResidualTrial& t : trials) {
-    x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
-    y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
-  }
-  return {(x0 + x1) / 2, (y0 + y1) / 2};
+  Extent box;
+  for (const ResidualTrial& t : trials) box.add(t.X_WS);
+  return {(box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2};
 }
 
 }  // namespace

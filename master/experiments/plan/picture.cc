@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/pose/extent.h"
 #include "common/svg/svg.h"
 #include "master/report/figures/line_chart.h"
 
@@ -22,17 +23,12 @@ struct View {
 };
 
 View view_of(const TrialLog& log) {
-  double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
+  Extent box;
   for (const Trial& trial : log.trials) {
-    for (const Pose& X : {trial.X_WS, trial.X_WE}) {
-      x0 = std::min(x0, X.x);
-      x1 = std::max(x1, X.x);
-      y0 = std::min(y0, X.y);
-      y1 = std::max(y1, X.y);
-    }
+    for (const Pose& X : {trial.X_WS, trial.X_WE}) box.add(X);
   }
-  const double width = 1.1 * std::max({x1 - x0, y1 - y0, 0.01});
-  return {(x0 + x1 - width) / 2, (y0 + y1 - width) / 2, width};
+  const double width = 1.1 * std::max(box.longer_side(), 0.01);
+  return {(box.x0 + box.x1 - width) / 2, (box.y0 + box.y1 - width) / 2, width};
 }
 
 void draw_arrow(Svg& svg, SvgPoint from, SvgPoint to, const std::string& colour) {

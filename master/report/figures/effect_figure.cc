@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 
+#include "common/pose/extent.h"
 #include "common/svg/svg.h"
 
 namespace gapfarm {
@@ -59,25 +60,20 @@ Scene scene_of(const Effect& effect, std::span<const double> values, const Pose&
 class View {
  public:
   View(SvgPoint corner, const EffectDrives& drives) {
-    double left = 0, right = 0, low = 0, high = 0;
-    const auto reach = [&](const Pose& X) {
-      left = std::min(left, X.x);
-      right = std::max(right, X.x);
-      low = std::min(low, X.y);
-      high = std::max(high, X.y);
-    };
+    Extent box;
+    box.add(Pose());
     const auto reach_all = [&](const LoggedDrive& drive) {
-      std::for_each(drive.path.begin(), drive.path.end(), reach);
-      reach(drive.end);
+      for (const Pose& X : drive.path) box.add(X);
+      box.add(drive.end);
     };
     reach_all(drives.without);
     std::for_each(drives.with.begin(), drives.with.end(), reach_all);
     const double width = kPanelWidth - 2 * kMargin;
     const double height = kPanelHeight - kPlotTop - 2 * kMargin;
-    scale_ = std::min(width / std::max(right - left, kLeastSpan_m),
-                      height / std::max(high - low, kLeastSpan_m));
-    origin_ = {corner.x + kPanelWidth / 2 - scale_ * (left + right) / 2,
-               corner.y + (kPanelHeight + kPlotTop) / 2 + scale_ * (low + high) / 2};
+    scale_ = std::min(width / std::max(box.x1 - box.x0, kLeastSpan_m),
+                      height / std::max(box.y1 - box.y0, kLeastSpan_m));
+    origin_ = {corner.x + kPanelWidth / 2 - scale_ * (box.x0 + box.x1) / 2,
+               corner.y + (kPanelHeight + kPlotTop) / 2 + scale_ * (box.y0 + box.y1) / 2};
   }
 
   double scale() const { return scale_; }  // px/m
