@@ -115,17 +115,15 @@ Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const Paramet
   asked.fitness.kind = FitnessKind::kLogScore;
   DrivenPaths paths;
   if (Status s = put_stretches(runs, every_s, &asked, &paths); !s) return s.error();
-  const auto before = simulated_ends(farm, asked);
-  if (!before) return before.error();
+  ASSIGN_OR_RETURN(const auto before, simulated_ends(farm, asked));
   asked.values = values;
-  const auto after = simulated_ends(farm, asked);
-  if (!after) return after.error();
+  ASSIGN_OR_RETURN(const auto after, simulated_ends(farm, asked));
   std::size_t next = 0;
   std::vector<double> off_before, off_after;
   for (DrivenPath& path : paths.runs) {
     for (std::size_t k = 1; k < path.logged.size(); ++k, ++next) {
-      path.before.push_back((*before)[next]);
-      path.after.push_back((*after)[next]);
+      path.before.push_back(before[next]);
+      path.after.push_back(after[next]);
     }
     off_before.push_back(end_distance(path.before, path.logged));
     off_after.push_back(end_distance(path.after, path.logged));

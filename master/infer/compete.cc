@@ -88,13 +88,13 @@ Result<std::vector<Runner>> Search::at_starts(std::size_t hypothesis, const Anch
     spaces.push_back(space.holding(start.at));
     reach.push_back(std::move(some));
   }
-  auto fits =
-      Fitter(scope_.forward, scope_.observations, space).starts(points, spaces, reach, anchor.z);
-  if (!fits) return fits.error();
+  ASSIGN_OR_RETURN(
+      auto fits,
+      Fitter(scope_.forward, scope_.observations, space).starts(points, spaces, reach, anchor.z));
   std::vector<Runner> runners;
-  for (std::size_t k = 0; k < fits->size(); ++k) {
-    if (std::isfinite((*fits)[k].score))
-      runners.push_back({hypothesis, spaces[k], std::move((*fits)[k])});
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    if (std::isfinite(fits[k].score))
+      runners.push_back({hypothesis, spaces[k], std::move(fits[k])});
   }
   std::stable_sort(runners.begin(), runners.end(),
                    [](const Runner& a, const Runner& b) { return a.fit.score > b.fit.score; });
@@ -140,10 +140,9 @@ Result<std::vector<Runner>> Search::line_up(const std::vector<Anchor>& anchors,
         for (Runner& runner : at) runners.push_back(std::move(runner));
       }
       if (!h.from_neutral) continue;
-      auto neutral = from_neutral(h, fits, anchor);
-      if (!neutral) return neutral.error();
-      if (everywhere || fits.promise(*neutral) > terms.least_gain) {
-        runners.push_back({k, space, std::move(*neutral)});
+      ASSIGN_OR_RETURN(auto neutral, from_neutral(h, fits, anchor));
+      if (everywhere || fits.promise(neutral) > terms.least_gain) {
+        runners.push_back({k, space, std::move(neutral)});
       }
     }
   }
@@ -153,10 +152,9 @@ Result<std::vector<Runner>> Search::line_up(const std::vector<Anchor>& anchors,
 Result<std::vector<Runner>> Search::from(const std::vector<Runner>& others) const {
   std::vector<Runner> runners;
   for (const Runner& other : others) {
-    auto fit = fitter(other.space).start(other.fit.u);
-    if (!fit) return fit.error();
-    if (!std::isfinite(fit->score)) continue;
-    runners.push_back({other.hypothesis, other.space, std::move(*fit)});
+    ASSIGN_OR_RETURN(auto fit, fitter(other.space).start(other.fit.u));
+    if (!std::isfinite(fit.score)) continue;
+    runners.push_back({other.hypothesis, other.space, std::move(fit)});
   }
   return runners;
 }
@@ -201,9 +199,9 @@ Status Search::search_blindly(Runner* runner) const {
          .evaluations = kBlindSearch * static_cast<int>(own.size())},
         &best);
   if (!predicted) return predicted;
-  auto fit = fits.start(joined(base, Eigen::VectorXd::Map(best.data(), own.size())));
-  if (!fit) return fit.error();
-  if (fit->score > runner->fit.score) runner->fit = std::move(*fit);
+  ASSIGN_OR_RETURN(auto fit,
+                   fits.start(joined(base, Eigen::VectorXd::Map(best.data(), own.size()))));
+  if (fit.score > runner->fit.score) runner->fit = std::move(fit);
   return {};
 }
 
@@ -221,11 +219,10 @@ Status Search::search_blindly(double score, std::vector<Runner>* runners) const 
 Result<Model> refitted_base(const Forward& forward, const Observations& observations, Model base,
                             const Runner& best) {
   const Fitter fitter(forward, observations, base.space);
-  auto fit = fitter.start(best.fit.u.head(base.fit.u.size()));
-  if (!fit) return fit.error();
-  if (Status s = fitter.improve(&*fit, kLongSearch); !s) return s.error();
-  if (!(fit->score > base.fit.score)) return base;
-  return model_of(forward, observations, base.space, std::move(*fit));
+  ASSIGN_OR_RETURN(auto fit, fitter.start(best.fit.u.head(base.fit.u.size())));
+  if (Status s = fitter.improve(&fit, kLongSearch); !s) return s.error();
+  if (!(fit.score > base.fit.score)) return base;
+  return model_of(forward, observations, base.space, std::move(fit));
 }
 
 // The best runners, so many of each hypothesis; `runners` are sorted.
@@ -296,30 +293,28 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
     *runners = best_of_each(std::move(*runners), std::max(most, many / 2), many > 2 * most ? 2 : 1);
     if (runners->size() <= most) break;
   }
-  auto best = half ? whole.from(*runners) : std::move(runners);
-  if (!best) return best.error();
-  if (Status s = whole.run(kMiddleSearch, &*best); !s) return s.error();
-  if (Status s = whole.search_blindly(base.fit.score, &*best); !s) return s.error();
-  report(*best);
+  ASSIGN_OR_RETURN(auto best, half ? whole.from(*runners) : std::move(runners));
+  if (Status s = whole.run(kMiddleSearch, &best); !s) return s.error();
+  if (Status s = whole.search_blindly(base.fit.score, &best); !s) return s.error();
+  report(best);
   const double worth = base.fit.score + terms.least_gain;
-  std::erase_if(*best, [&](const Runner& r) { return r.fit.score < worth; });
-  std::vector<Runner> leaders = best_of_each(std::move(*best), kFinalists, 1);
+  std::erase_if(best, [&](const Runner& r) { return r.fit.score < worth; });
+  std::vector<Runner> leaders = best_of_each(std::move(best), kFinalists, 1);
   if (Status s = whole.run(kLongSearch, &leaders); !s) return s.error();
   report(leaders);
   if (leaders.empty()) return Contest{std::move(base), {}};
-  auto refitted = refitted_base(forward, observations, std::move(base), leaders.front());
-  if (!refitted) return refitted.error();
-  Contest contest{std::move(*refitted), {}};
+  ASSIGN_OR_RETURN(auto refitted,
+                   refitted_base(forward, observations, std::move(base), leaders.front()));
+  Contest contest{std::move(refitted), {}};
   for (const Runner& leader : leaders) {
-    auto model = model_of(forward, observations, leader.space, leader.fit);
-    if (!model) return model.error();
+    ASSIGN_OR_RETURN(auto model, model_of(forward, observations, leader.space, leader.fit));
     const Eigen::Index before = contest.base.fit.u.size();
-    PairedGain gain = gain_over(*model, contest.base, before);
+    PairedGain gain = gain_over(model, contest.base, before);
     // No more than in sample, less what a parameter gains by luck.
-    const double luck = 0.5 * static_cast<double>(model->fit.u.size() - before);
-    gain.sum = std::min(gain.sum, model->fit.score - contest.base.fit.score - luck) -
+    const double luck = 0.5 * static_cast<double>(model.fit.u.size() - before);
+    gain.sum = std::min(gain.sum, model.fit.score - contest.base.fit.score - luck) -
                hypotheses[leader.hypothesis].luck;
-    contest.contenders.push_back({leader.hypothesis, std::move(*model), gain.sum, gain.se});
+    contest.contenders.push_back({leader.hypothesis, std::move(model), gain.sum, gain.se});
   }
   std::ranges::stable_sort(contest.contenders, std::ranges::greater{}, &Contender::gain);
   // Nothing distinguishes those within what is no progress of a fit.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/try.h"
 #include "common/math/algebra.h"
 
 namespace gapfarm::infer {
@@ -95,22 +96,21 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
     requests.push_back(
         {spaces[k].values(points[k]), reach.empty() ? std::vector<std::uint32_t>() : reach[k]});
   }
-  const auto ends = forward_(requests);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, forward_(requests));
   std::vector<Fit> fits(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     fits[k].u = points[k];
-    if (!(*ends)[k]) continue;
+    if (!ends[k]) continue;
     const std::vector<std::uint32_t>& some = requests[k].trials;
     if (some.empty()) {
-      judge(whitened(*(*ends)[k]) + beside(points[k]), &fits[k]);
+      judge(whitened(*ends[k]) + beside(points[k]), &fits[k]);
       continue;
     }
     Eigen::VectorXd z = elsewhere;
     const Eigen::VectorXd linear = beside(points[k]);
     for (std::size_t j = 0; j < some.size(); ++j) {
       const auto at = static_cast<Eigen::Index>(3 * some[j]);
-      z.segment<3>(at) = residual(some[j], (*(*ends)[k])[j]) + linear.segment<3>(at);
+      z.segment<3>(at) = residual(some[j], (*ends[k])[j]) + linear.segment<3>(at);
     }
     judge(std::move(z), &fits[k]);
   }
@@ -118,9 +118,8 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
 }
 
 Result<Fit> Fitter::start(const Eigen::VectorXd& u) const {
-  auto fits = starts({u}, {space_});
-  if (!fits) return fits.error();
-  return std::move(fits->front());
+  ASSIGN_OR_RETURN(auto fits, starts({u}, {space_}));
+  return std::move(fits.front());
 }
 
 // Of every dimension; -1: it is a parameter's.
@@ -155,8 +154,7 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
     requests.push_back({space_.values(u), {}});
     moved.push_back(step);
   }
-  const auto ends = forward_(requests);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, forward_(requests));
   fit->slopes.conservativeResize(fit->z.size(), dimensions);
   fit->slopes.rightCols(dimensions - known).setZero();
   for (Eigen::Index k = known; k < dimensions; ++k) {
@@ -166,11 +164,11 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
   const Eigen::VectorXd linear = beside(fit->u);
   for (std::size_t j = 0; j < requests.size(); ++j) {
     const Eigen::Index k = dimension[j];
-    if (!(*ends)[j]) {
+    if (!ends[j]) {
       fit->differences[k] /= 4;
       continue;
     }
-    const Eigen::VectorXd change = whitened(*(*ends)[j]) + linear - fit->z;
+    const Eigen::VectorXd change = whitened(*ends[j]) + linear - fit->z;
     fit->slopes.col(k) = change / moved[j];
     const double unit =
         std::sqrt(change.squaredNorm() / static_cast<double>(change.size())) / std::abs(moved[j]);
@@ -229,20 +227,19 @@ Status Fitter::step(Fit* fit) const {
       fit->settled = fit->fresh;
       break;
     }
-    auto next = start(fit->u + delta);
-    if (!next) return next.error();
-    const double gained = next->score - fit->score;
+    ASSIGN_OR_RETURN(auto next, start(fit->u + delta));
+    const double gained = next.score - fit->score;
     if (gained > 0) {
       const double trust = gained / promised;
-      next->damping = trust > kLeastTrust ? fit->damping / 10 : fit->damping;
-      next->differences = fit->differences;
+      next.damping = trust > kLeastTrust ? fit->damping / 10 : fit->damping;
+      next.differences = fit->differences;
       // Broyden's correction: slopes of before that give what this step did.
-      next->slopes = fit->slopes + (next->z - fit->z - fit->slopes * delta) * delta.transpose() /
-                                       delta.squaredNorm();
-      next->settled = gained < kSettledGain && fit->fresh;
+      next.slopes = fit->slopes + (next.z - fit->z - fit->slopes * delta) * delta.transpose() /
+                                      delta.squaredNorm();
+      next.settled = gained < kSettledGain && fit->fresh;
       const bool lied = trust < kLeastTrust || trust > kMostTrust;
-      if (lied || gained < kSettledGain) next->slopes.resize(0, 0);
-      *fit = std::move(*next);
+      if (lied || gained < kSettledGain) next.slopes.resize(0, 0);
+      *fit = std::move(next);
       return {};
     }
     fit->damping = std::max(kLeastDamping, fit->damping) * (half == 0 ? 30 : 10);

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <set>
 
+#include "common/base/try.h"
 #include "common/math/digits.h"
 #include "common/score/motion_model.h"
 
@@ -120,15 +121,14 @@ std::vector<v1::Task> Predictor::tasks(const Overrides& at) const {
 Result<std::vector<std::vector<Pose>>> Predictor::ends(
     const std::vector<PredictionRequest>& requests) {
   std::vector<std::optional<Error>> errors;
-  auto all = simulate(hash_, requests, &errors);
-  if (!all) return all.error();
+  ASSIGN_OR_RETURN(auto all, simulate(hash_, requests, &errors));
   std::vector<std::vector<Pose>> ends;
   for (std::size_t k = 0; k < requests.size(); ++k) {
-    if (!(*all)[k]) {
+    if (!all[k]) {
       last_failure_ = errors[k]->message;
       return *errors[k];
     }
-    ends.push_back(std::move(*(*all)[k]));
+    ends.push_back(std::move(*all[k]));
   }
   return ends;
 }
@@ -146,9 +146,9 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::attempt(
 Result<std::optional<std::vector<Pose>>> Predictor::attempt_slower(const Overrides& at,
                                                                    double factor) {
   std::vector<std::optional<Error>> errors;
-  auto all = simulate(farm_.add_problem(to_proto(slower(problem_, factor))), {{at, {}}}, &errors);
-  if (!all) return all.error();
-  return std::move(all->front());
+  ASSIGN_OR_RETURN(auto all, simulate(farm_.add_problem(to_proto(slower(problem_, factor))),
+                                      {{at, {}}}, &errors));
+  return std::move(all.front());
 }
 
 Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
@@ -170,8 +170,7 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
       asked.emplace_back(k, std::move(part));
     }
   }
-  const auto results = farm_.run(problem, tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm_.run(problem, tasks));
   predictions_ += requests.size();
   std::vector<std::optional<std::vector<Pose>>> ends(requests.size());
   for (std::size_t k = 0; k < requests.size(); ++k) {
@@ -181,7 +180,7 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
   }
   for (std::size_t t = 0; t < tasks.size(); ++t) {
     const auto& [k, part] = asked[t];
-    const v1::TaskResult& result = (*results)[t];
+    const v1::TaskResult& result = results[t];
     if (result.outcome() != v1::OK) {
       if (!(*errors)[k]) (*errors)[k] = bad_point(problem_, requests[k].at, result);
       ends[k].reset();
@@ -216,11 +215,10 @@ Result<std::vector<std::vector<PathSample>>> Predictor::paths(
     trace->mutable_command()->set_duration(command.duration_s);
     trace->set_interval(interval_s);
   }
-  const auto results = farm_.run(hash_, tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
   predictions_ += tasks.size();
   std::vector<std::vector<PathSample>> paths;
-  for (const v1::TaskResult& result : *results) {
+  for (const v1::TaskResult& result : results) {
     if (result.outcome() != v1::OK) {
       last_failure_ = bad_point(problem_, at, result).message;
       return failed("a path");

@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include "common/base/try.h"
+
 namespace gapfarm::infer {
 
 Scope scope_of(const Forward& forward, const Observations& whole,
@@ -57,10 +59,9 @@ Forward remembering(Forward forward) {
       if (known->count({p.at, p.trials}) == 0) unknown.push_back(p);
     }
     if (!unknown.empty()) {
-      auto ends = forward(unknown);
-      if (!ends) return ends.error();
+      ASSIGN_OR_RETURN(auto ends, forward(unknown));
       for (std::size_t k = 0; k < unknown.size(); ++k) {
-        (*known)[{unknown[k].at, unknown[k].trials}] = std::move((*ends)[k]);
+        (*known)[{unknown[k].at, unknown[k].trials}] = std::move(ends[k]);
       }
     }
     std::vector<Ends> all;

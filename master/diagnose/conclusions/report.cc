@@ -199,9 +199,7 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
   }
   append(of.subject.cautions(named.study(), of.problem.log), &d);
   fill_parameters(of, refit, &result);
-  auto drives = shown_drives(of, result);
-  if (!drives) return drives.error();
-  d.drives = std::move(*drives);
+  ASSIGN_OR_RETURN(d.drives, shown_drives(of, result));
   d.screening = complete_screening(of, screening, refit.judged);
   append(not_looked_for(of), &d);
   if (of.frame_m.x() != 0 || of.frame_m.y() != 0) {

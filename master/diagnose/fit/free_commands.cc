@@ -8,6 +8,7 @@
 #include <set>
 #include <tuple>
 
+#include "common/base/try.h"
 #include "master/diagnose/fit/slopes.h"
 
 namespace gapfarm {
@@ -321,8 +322,7 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
     requests.push_back({study.base, {}});
     requests.back().at[*lag] = kLagStep;
   }
-  const auto ends = predictor.attempt(requests);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
 
   std::vector<Pose> middle;
   for (const ResidualTrial& t : study.trials) middle.push_back(t.X_WP);
@@ -332,7 +332,7 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
   add_column(study, faster, 0.3, &columns);
   for (std::size_t r = 0; r < study.drive.retuned.size(); ++r) {
     const RetunedParameter& parameter = study.drive.retuned[r];
-    const auto slope = central_slope(middle, (*ends)[2 * r], (*ends)[2 * r + 1], kStep);
+    const auto slope = central_slope(middle, ends[2 * r], ends[2 * r + 1], kStep);
     if (slope) {
       add_column(study, *slope, parameter.prior_sd, &columns);
     } else {
@@ -340,8 +340,8 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
     }
   }
   // Motors of some hundredths of a second are part of any robot.
-  if (lag && ends->back()) {
-    add_column(study, differences(study, *ends->back(), kLagStep), 0.02, &columns);
+  if (lag && ends.back()) {
+    add_column(study, differences(study, *ends.back(), kLagStep), 0.02, &columns);
   }
   if (study.free_commands) {
     for (Eigen::VectorXd& column : smooth_misfits(study)) columns.push_back(std::move(column));

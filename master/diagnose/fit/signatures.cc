@@ -143,18 +143,17 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));
   }
-  const auto ends = predictor.attempt(requests);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
   // Asked once, and not again and again, of a program that can simulate none.
   const auto failed = [](const auto& simulated) { return !simulated; };
-  if (std::all_of(ends->begin(), ends->end(), failed)) predictor.exclude(kPatchEffect);
+  if (std::all_of(ends.begin(), ends.end(), failed)) predictor.exclude(kPatchEffect);
   std::vector<Signature> all;
   for (std::size_t k = 0; k < requests.size(); ++k) {
-    if (!(*ends)[k]) predictor.exclude(std::string("some places of ") + kPatchEffect);
+    if (!ends[k]) predictor.exclude(std::string("some places of ") + kPatchEffect);
     std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
-    for (std::size_t j = 0; (*ends)[k] && j < requests[k].trials.size(); ++j) {
+    for (std::size_t j = 0; ends[k] && j < requests[k].trials.size(); ++j) {
       const std::size_t i = requests[k].trials[j];
-      d[i] = local_difference(without.ends[i], (*(*ends)[k])[j]);
+      d[i] = local_difference(without.ends[i], (*ends[k])[j]);
     }
     Signature s;
     s.effect = kPatchEffect;

@@ -348,10 +348,10 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
     ASSIGN_OR_RETURN(const auto slopes, base_slopes(predictor, parameters, ends, *study));
     ASSIGN_OR_RETURN(const auto both, both_sides(predictor, slopes, ends, study));
     if (study->free_commands) {
-      const auto turned = predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}}});
-      if (!turned) return turned.error();
-      if (!turned->front()) return predictor.failed("the base model's sides cannot be parted");
-      const Slope apart = differences(*study, *turned->front(), kGainStep);
+      ASSIGN_OR_RETURN(const auto turned,
+                       predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}}}));
+      if (!turned.front()) return predictor.failed("the base model's sides cannot be parted");
+      const Slope apart = differences(*study, *turned.front(), kGainStep);
       for (std::size_t i = 0; i < study->size(); ++i) set_gains(both[i], apart[i], i, study);
     }
     study->use_noise(study->noise);

@@ -3,6 +3,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/diagnose/result/json_fields.h"
 #include "master/io/log_checks/finding.h"
@@ -213,9 +214,7 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
     if (Status s = read_residual(json["residual"], &diagnosis.residual); !s) return s.error();
   }
   if (json.contains("trials")) {
-    auto trials = parse_trials(json["trials"], diagnosis.shown);
-    if (!trials) return trials.error();
-    diagnosis.trials = std::move(*trials);
+    ASSIGN_OR_RETURN(diagnosis.trials, parse_trials(json["trials"], diagnosis.shown));
   }
   return diagnosis;
 }

@@ -229,26 +229,25 @@ class Selection {
 
   // One contest; false: nothing more enters.
   Result<bool> add_best() {
-    const auto hypotheses = proposed();
-    if (!hypotheses) return hypotheses.error();
-    if (hypotheses->empty()) return false;
+    ASSIGN_OR_RETURN(const auto hypotheses, proposed());
+    if (hypotheses.empty()) return false;
     auto contest = infer::compete(
-        competition_.forward(), competition_.observations(), found_->model, *hypotheses, terms_,
+        competition_.forward(), competition_.observations(), found_->model, hypotheses, terms_,
         [&](const std::vector<infer::Standing>& standings) { report_contest(of_, standings); });
     if (!contest) return contest.error();
     if (found_->chosen.empty()) found_->base = contest->base;
     found_->model = contest->base;
-    add_rows(of_, *hypotheses, *contest, &found_->rows);
+    add_rows(of_, hypotheses, *contest, &found_->rows);
     SelectionStep& step = found_->steps.emplace_back();
     for (const ChosenEffect& c : found_->chosen) {
       step.explained.push_back(c.candidate.signature.effect);
     }
     for (const infer::Contender& c : contest->contenders) {
-      step.offered.emplace_back((*hypotheses)[c.hypothesis].name, c.gain);
+      step.offered.emplace_back(hypotheses[c.hypothesis].name, c.gain);
     }
     if (contest->contenders.empty()) return false;
     infer::Contender& best = contest->contenders.front();
-    const std::string name = (*hypotheses)[best.hypothesis].name;
+    const std::string name = hypotheses[best.hypothesis].name;
     if (!enters(best, name)) return false;
     if (auto why = at_its_bound(of_, name, best.model.space.values(best.model.fit.u))) {
       found_->refused.push_back({{name}, best.gain, 0, "", std::move(*why)});
@@ -258,7 +257,7 @@ class Selection {
     ChosenEffect chosen;
     chosen.candidate.gain = best.gain;
     chosen.candidate.signature.effect = name;
-    chosen.aliases = aliases_of(of_, name, *hypotheses, *contest);
+    chosen.aliases = aliases_of(of_, name, hypotheses, *contest);
     found_->chosen.push_back(std::move(chosen));
     found_->model = std::move(best.model);
     if (Status s = drop_idle(); !s) return s.error();
@@ -321,19 +320,17 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Study& from
   study.base = found.model.space.values(found.model.fit.u);
   if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s;
   ASSIGN_OR_RETURN(auto raw, evidence_of(of, std::move(study)));
-  auto evidence = measure(of, raw.study);
-  if (!evidence) return evidence.error();
-  named.evidence = std::make_shared<const Evidence>(std::move(*evidence));
+  ASSIGN_OR_RETURN(auto evidence, measure(of, raw.study));
+  named.evidence = std::make_shared<const Evidence>(std::move(evidence));
   screening->catalogue = std::make_unique<Proposals>(
       of.predictor, named.study(), std::vector<Signature>(), named.evidence->base);
   screening->explained = 0;
   for (const ChosenEffect& e : named.chosen) *screening->explained += e.candidate.gain;
   if (named.chosen.empty()) return {};
-  auto estimates =
+  ASSIGN_OR_RETURN(
+      named.estimates,
       fit_jointly(of.predictor, named.study(), candidates_of(named.chosen), named.study().base,
-                  BaseParameters::kFitted, named.evidence->nuisances, 1);
-  if (!estimates) return estimates.error();
-  named.estimates = std::move(*estimates);
+                  BaseParameters::kFitted, named.evidence->nuisances, 1));
   return {};
 }
 

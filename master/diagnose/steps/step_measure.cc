@@ -81,10 +81,9 @@ Result<Explanation> put_late_readings_right(const DiagnosisRequest& of, Explanat
     RETURN_IF_ERROR(of.subject.tune(of.predictor, of.options.keep_base, &study));
     ASSIGN_OR_RETURN(auto measured, measure(of, study));
     partial.evidence = std::make_shared<const Evidence>(std::move(measured));
-    auto faster = end_velocities(of, partial.study());
-    if (!faster) return faster.error();
-    if (faster->empty()) break;
-    velocity = std::move(*faster);
+    ASSIGN_OR_RETURN(auto faster, end_velocities(of, partial.study()));
+    if (faster.empty()) break;
+    velocity = std::move(faster);
     partial.latency = fit_latency(partial.study(), velocity);
   }
   ASSIGN_OR_RETURN(const auto from_rest,

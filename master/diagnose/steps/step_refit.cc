@@ -149,9 +149,7 @@ Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, 
   const bool bounded = came_from_bounds(refit, measured);
   if (missing) judged = with_warning(std::move(judged), std::move(*missing));
   if (bounded) judged = with_base_warning(of, measured, std::move(judged));
-  auto nested = nested_fits(of, judged.named, folds);
-  if (!nested) return nested.error();
-  refit.nested = std::move(*nested);
+  ASSIGN_OR_RETURN(refit.nested, nested_fits(of, judged.named, folds));
   return with_floor(of, std::move(refit), folds);
 }
 
@@ -209,9 +207,7 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
   std::set<std::string> were_last;
   for (;;) {
-    auto nested = nested_fits(of, named, folds);
-    if (!nested) return nested.error();
-    refit.nested = std::move(*nested);
+    ASSIGN_OR_RETURN(refit.nested, nested_fits(of, named, folds));
     emit_gaps(of, refit.nested);
     auto idle = of_no_use(refit.judged, refit.nested, std::nullopt, were_last);
     if (!idle) {

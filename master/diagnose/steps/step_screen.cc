@@ -135,9 +135,8 @@ Result<Screening> compete_from_free_base(const DiagnosisRequest& of, Explanation
   std::erase_if(study.base,
                 [&](const auto& entry) { return !of.table()[entry.first].effect.empty(); });
   if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s.error();
-  auto evidence = evidence_of(of, std::move(study));
-  if (!evidence) return evidence.error();
-  found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
+  ASSIGN_OR_RETURN(auto evidence, evidence_of(of, std::move(study)));
+  found.evidence = std::make_shared<const Evidence>(std::move(evidence));
   return compete(of, std::move(found));
 }
 
@@ -195,9 +194,8 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
       return table[entry.first].effect == effect.signature.effect;
     });
   }
-  const auto ends = of.predictor.attempt(without);
-  if (!ends) return ends.error();
-  for (const auto& simulated : *ends) {
+  ASSIGN_OR_RETURN(const auto ends, of.predictor.attempt(without));
+  for (const auto& simulated : ends) {
     if (!simulated) return Relinearised{};
   }
   Relinearised at_estimate{study.whiten(fit.residuals), {}};
@@ -205,7 +203,7 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
     const std::string& name = effects[k].signature.effect;
     std::vector<Eigen::Vector3d> contribution;
     for (std::size_t i = 0; i < study.size(); ++i) {
-      contribution.push_back(local_difference((*(*ends)[k])[i], fit.ends[i]));
+      contribution.push_back(local_difference((*ends[k])[i], fit.ends[i]));
     }
     std::vector<Eigen::Index> own;
     for (std::size_t p = 0; p < fit.parameters.size(); ++p) {
@@ -239,11 +237,11 @@ Result<std::unique_ptr<Proposals>> marks_of(const DiagnosisRequest& of, const Ex
 Status screen_alone(const DiagnosisRequest& of, const Explanation& found, Screening* screening) {
   Explanation before = found;
   before.chosen.clear();
-  auto alone = screening->catalogue->candidates(explained_by(*screening->catalogue, before), {});
-  if (!alone) return alone.error();
-  screening->rows = screened(of, *found.evidence, *alone);
-  emit_candidates(of, *alone);
-  screening->alone = std::move(*alone);
+  ASSIGN_OR_RETURN(auto alone, screening->catalogue->candidates(
+                                   explained_by(*screening->catalogue, before), {}));
+  screening->rows = screened(of, *found.evidence, alone);
+  emit_candidates(of, alone);
+  screening->alone = std::move(alone);
   return {};
 }
 
