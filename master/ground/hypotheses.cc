@@ -67,24 +67,21 @@ class Catalogue {
   std::vector<GroundHypothesis> all;
 
  private:
-  bool has(const std::string& name) const { return contains(rows_, name, &KinematicRow::name); }
   KinematicRow row(const std::string& name) const {
     return *std::ranges::find(rows_, name, &KinematicRow::name);
   }
-  void value(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
-             std::vector<KinematicRow> freed) {
+  GroundHypothesis& value(const std::string& name, std::vector<std::string> aliases,
+                          const std::string& thing, std::vector<KinematicRow> freed) {
+    const double more_values = static_cast<double>(freed.size()) - 1;
     all.push_back({name, std::move(aliases), thing, std::move(freed)});
-    all.back().price = kPriceOfAValue * (static_cast<double>(all.back().freed.size()) - 1);
+    all.back().price = kPriceOfAValue * more_values;
+    return all.back();
   }
-  void more(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
-            std::vector<KinematicRow> freed) {
-    value(name, std::move(aliases), thing, std::move(freed));
-    all.back().only_more = true;
-  }
-  void fault(const std::string& name, const std::string& thing, const std::string& remedy,
-             std::function<void(RunLog*)> put_right, double metres = 1,
-             std::vector<std::string> aliases = {}) {
-    all.push_back({name, std::move(aliases), thing, {}, std::move(put_right), metres, remedy});
+  GroundHypothesis& fault(const std::string& name, std::vector<std::string> aliases,
+                          const std::string& thing, const std::string& remedy,
+                          std::function<void(RunLog*)> put_right) {
+    all.push_back({name, std::move(aliases), thing, {}, std::move(put_right), 1, remedy});
+    return all.back();
   }
 
   const GroundRobot& robot_;
@@ -112,42 +109,41 @@ constexpr CommandUnit kCommandUnits[] = {
 void Catalogue::wrong_commands() {
   const auto pairs = channel_pairs(robot_);
   if (!pairs.empty()) {
-    fault("sides_swapped", "left and right of the commands", "Swap the columns of the two sides.",
-          change_commands([pairs](std::vector<double>& v) {
+    fault("sides_swapped", {}, "left and right of the commands",
+          "Swap the columns of the two sides.", change_commands([pairs](std::vector<double>& v) {
             for (const auto& [l, r] : pairs) std::swap(v[l], v[r]);
           }));
     for (const bool left : {true, false}) {
-      fault("side_reversed", std::string("the sign of the ") + (left ? "left" : "right") + " side",
+      fault("side_reversed", {"command_sign"},
+            std::string("the sign of the ") + (left ? "left" : "right") + " side",
             "Turn the sign of that column.", change_commands([pairs, left](std::vector<double>& v) {
               for (const auto& [l, r] : pairs) v[left ? l : r] *= -1;
-            }),
-            1, {"command_sign"});
+            }));
     }
   }
-  fault("command_reversed", "the sign of every command", "Turn the sign of the commands.",
-        change_commands([](std::vector<double>& v) {
+  fault("command_reversed", {"command_sign"}, "the sign of every command",
+        "Turn the sign of the commands.", change_commands([](std::vector<double>& v) {
           for (double& value : v) value = -value;
-        }),
-        1, {"command_sign"});
+        }));
   for (std::size_t c = 0; c < robot_.channels.size(); ++c) {
     const std::string& channel = robot_.channels[c];
     if (channel != "steering" && channel != "omega" && channel != "vy" && channel != "v") continue;
     const bool turns = channel == "steering" || channel == "omega";
-    fault(turns ? "steering_reversed" : "command_reversed", "the sign of " + channel,
-          "Turn the sign of that column.",
-          change_commands([c](std::vector<double>& v) { v[c] *= -1; }), 1, {"command_sign"});
+    fault(turns ? "steering_reversed" : "command_reversed", {"command_sign"},
+          "the sign of " + channel, "Turn the sign of that column.",
+          change_commands([c](std::vector<double>& v) { v[c] *= -1; }));
   }
   for (const CommandUnit& unit : kCommandUnits) {
     if (unit.of != robot_.command) continue;
     const auto of_it = mapped(robot_.channels, [&](const std::string& channel) {
       return unit.of != CommandKind::kTwist || unit.turns == (channel == "omega");
     });
-    fault("unit_error", std::string("the unit of the ") + unit.thing + ": " + unit.name,
+    fault("unit_error", {"command_units", unit.alias},
+          std::string("the unit of the ") + unit.thing + ": " + unit.name,
           std::string("Multiply them by ") + std::to_string(unit.factor) + ".",
           change_commands([f = unit.factor, of_it](std::vector<double>& v) {
             for (std::size_t c = 0; c < v.size(); ++c) v[c] *= of_it[c] ? f : 1;
-          }),
-          1, {"command_units", unit.alias});
+          }));
   }
 }
 
@@ -155,36 +151,36 @@ void Catalogue::wrong_poses() {
   const auto diagonal = [](double x, double y, double theta) -> Eigen::Matrix3d {
     return Eigen::Vector3d(x, y, theta).asDiagonal();
   };
-  fault("heading_flipped", "the sign of the headings", "Turn the sign of theta.",
-        change_poses(diagonal(1, 1, -1)), 1, {"heading_sign"});
-  fault("axes_mirrored", "a world frame that is left-handed",
+  fault("heading_flipped", {"heading_sign"}, "the sign of the headings", "Turn the sign of theta.",
+        change_poses(diagonal(1, 1, -1)));
+  fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
         "Turn the sign of y, and that of theta when it follows the robot's turns the wrong way.",
-        change_poses(diagonal(1, -1, 1)), 1, {"axes_swapped"});
+        change_poses(diagonal(1, -1, 1)));
   Eigen::Matrix3d swapped = diagonal(0, 0, 1);
   swapped(0, 1) = swapped(1, 0) = 1;
-  fault("axes_swapped", "x and y of the poses", "Swap the columns x and y.", change_poses(swapped),
-        1, {"axes_mirrored"});
   // Of increments the same as mirrored ones of a sensor that looks another way.
-  all.back().of_world = true;
-  fault("heading_unit", "headings in degrees", "Multiply theta by pi / 180.",
-        change_poses(diagonal(1, 1, pi / 180)), 1, {"unit_error"});
-  all.back().radians = pi / 180;
+  fault("axes_swapped", {"axes_mirrored"}, "x and y of the poses", "Swap the columns x and y.",
+        change_poses(swapped))
+      .of_world = true;
+  fault("heading_unit", {"unit_error"}, "headings in degrees", "Multiply theta by pi / 180.",
+        change_poses(diagonal(1, 1, pi / 180)))
+      .radians = pi / 180;
   for (const double turn : {pi / 2, -pi / 2, pi}) {
-    fault("heading_turned",
+    fault("heading_turned", {"marker_yaw", "heading_offset"},
           "headings that count from another axis, " + std::to_string(std::lround(turn * 180 / pi)) +
               " degrees on",
-          "State the marker's yaw.", change_poses(diagonal(1, 1, 1), turn), 1,
-          {"marker_yaw", "heading_offset"});
-    all.back().of_world = true;
+          "State the marker's yaw.", change_poses(diagonal(1, 1, 1), turn))
+        .of_world = true;
   }
   for (const auto& [unit, metres] : {std::pair{"millimetres", 0.001},
                                      {"centimetres", 0.01},
                                      {"decimetres", 0.1},
                                      {"inches", 0.0254},
                                      {"feet", 0.3048}}) {
-    fault("unit_error", std::string("positions in ") + unit,
+    fault("unit_error", {"pose_units", "pose_scale"}, std::string("positions in ") + unit,
           "Multiply x and y by " + std::to_string(metres) + ".",
-          change_poses(diagonal(metres, metres, 1)), metres, {"pose_units", "pose_scale"});
+          change_poses(diagonal(metres, metres, 1)))
+        .metres = metres;
   }
 }
 
@@ -222,10 +218,8 @@ void Catalogue::steering() {
         {row("steering_offset")});
   value("steering_gain", {"wheelbase"}, "the angle that is steered over the commanded one",
         {row("steering_gain")});
-  if (has("understeer")) {
-    value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
-          {row("understeer")});
-  }
+  value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
+        {row("understeer")});
   if (!robot_.steering.table.empty()) {
     value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
           {{"steering_left", 1, kSteeringGainShare, "ratio", "-"}});
@@ -241,7 +235,8 @@ void Catalogue::motors() {
         {{"drift", 0, 2e-5, "rate", "s/s"}});
   value("clock_drift", {"clock_offset"}, "the rate of the robot's clock against the tracker's",
         {{"rate", 0, 2e-5, "rate", "s/s"}});
-  more("battery_sag", {}, "what the drive loses a minute", {{"sag", 0, 0.005, "rate", "1/min"}});
+  value("battery_sag", {}, "what the drive loses a minute", {{"sag", 0, 0.005, "rate", "1/min"}})
+      .only_more = true;
   // Motors lie before what was measured, unless the file states them all the same.
   if (!robot_.measured || robot_.motors.lag_s > 0) {
     value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
@@ -256,13 +251,15 @@ void Catalogue::motors() {
   }
   if (!robot_.measured) {
     const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
-    more("motor_deadband", {}, "commands that move nothing",
-         {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}});
+    value("motor_deadband", {}, "commands that move nothing",
+          {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}})
+        .only_more = true;
   }
   const auto& limit = robot_.motors.acceleration_limit_m_s2;
   if (robot_.measured && !limit) return;
-  more("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
-       {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m", true}});
+  value("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
+        {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m", true}})
+      .only_more = true;
 }
 
 void Catalogue::marker() {
@@ -274,8 +271,8 @@ void Catalogue::marker() {
 void Catalogue::tracker() {
   value("pose_scale", {"unit_error", "camera_scale"}, "the scale of all positions",
         {{"pose_scale", 1, 0.01, "ratio", "-"}});
-  value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}});
-  all.back().of_world = true;
+  value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}})
+      .of_world = true;
 }
 
 // What another floor or another load changes.
