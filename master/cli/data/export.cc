@@ -21,11 +21,8 @@ struct Reported {
 };
 
 Result<Reported> read_source_of_export(const std::string& source, Console& console) {
-  if (const auto path = values_of(source)) {
-    ASSIGN_OR_RETURN(auto values, read_values(*path));
-    const RosFriction friction = ros_friction(values);
-    return Reported{std::move(values), friction, {}};
-  }
+  ASSIGN_OR_RETURN(const auto diagnosed, values_in(source));
+  if (diagnosed) return Reported{*diagnosed, ros_friction(*diagnosed), {}};
   ASSIGN_OR_RETURN(const auto ground, read_ground_source(source, console));
   ASSIGN_OR_RETURN(const auto fit, fit_source(ground, console));
   ReportedValues values = {ground.robot, ground.logs, {}};

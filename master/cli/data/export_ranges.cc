@@ -25,7 +25,7 @@ Result<Ranges> ranges_of_trials(const std::string& path) {
 }
 
 Result<Ranges> read_ranges(const std::string& source, Console& console) {
-  const auto values = values_of(source);
+  ASSIGN_OR_RETURN(const auto values, values_in(source));
   const auto diagnosis = std::filesystem::path(source) / "diagnosis.json";
   std::error_code ignored;
   if (!values && std::filesystem::exists(diagnosis, ignored)) {
@@ -33,8 +33,7 @@ Result<Ranges> read_ranges(const std::string& source, Console& console) {
   }
   GroundSource ground;
   if (values) {
-    ASSIGN_OR_RETURN(const auto reported, read_values(*values));
-    ground = {reported.given, reported.logs, {}};
+    ground = {values->given, values->logs, {}};
   } else {
     ASSIGN_OR_RETURN(ground, read_ground_source(source, console));
   }

@@ -61,16 +61,13 @@ Result<GroundReference> fit_source(const GroundSource& source, Console& console)
   return *std::move(asked.reference);
 }
 
-std::optional<std::string> values_of(const std::string& folder) {
-  const auto values = std::filesystem::path(folder) / "values.json";
+Result<std::optional<ReportedValues>> values_in(const std::string& folder) {
+  const auto path = std::filesystem::path(folder) / "values.json";
   std::error_code ignored;
-  if (!std::filesystem::exists(values, ignored)) return {};
-  return values.string();
-}
-
-Result<ReportedValues> read_values(const std::string& path) {
-  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
-  return parse_values(text, path);
+  if (!std::filesystem::exists(path, ignored)) return std::optional<ReportedValues>();
+  ASSIGN_OR_RETURN(const auto text, read_text_file(path.string()));
+  ASSIGN_OR_RETURN(auto values, parse_values(text, path.string()));
+  return std::optional(std::move(values));
 }
 
 Result<GroundSource> read_ground_source(const std::string& source, Console& console) {

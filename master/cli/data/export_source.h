@@ -42,9 +42,8 @@ struct GroundSource {
 Result<GroundSource> read_ground_source(const std::string& source, Console& console);
 // Every value of the robot's kinematics by its log.
 Result<GroundReference> fit_source(const GroundSource& source, Console& console);
-// values.json of a ground robot's diagnosis, where there is one.
-std::optional<std::string> values_of(const std::string& folder);
-Result<ReportedValues> read_values(const std::string& path);
+// By values.json of a ground robot's diagnosis, where there is one.
+Result<std::optional<ReportedValues>> values_in(const std::string& folder);
 
 Result<int> export_ranges(ExportCommand& command, CliContext& context);
 Result<int> export_runs(ExportCommand& command, CliContext& context);
