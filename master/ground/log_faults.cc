@@ -196,9 +196,9 @@ double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {
   return std::isfinite(least) ? least : 0;
 }
 
-std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,
-                                                  const WindowFit& fit) {
-  const WindowSet& windows = fitter.windows();
+std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search) {
+  const WindowFit& fit = search.fit;
+  const WindowSet& windows = search.windows;
   const std::size_t runs = windows.run_blocks.size();
   const Eigen::Index delay = row_index(fit.rows, "delay");
   if (runs < 2 || runs > kMostRuns || delay < 0) return {};
@@ -223,18 +223,17 @@ std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,
       at_s[r] = values[delay];
     }
   }
-  std::vector<RunClock> clocks;
+  std::vector<std::string> clocks;
   double own = 0;
   for (std::size_t r = 0; r < runs; ++r) {
     if (counts[r] == 0) continue;
     const double shift_s = std::abs(at_s[r] - fit.values[delay]);
     if (shift_s > kClockStep_s * (kClockSteps - 0.5)) return {};  // no clock within reach
-    clocks.push_back({r, at_s[r]});
+    clocks.push_back(fmt::format("{:+.2f} s in run {}", at_s[r], search.log.runs[r].run));
     own += best[r];
   }
   const double least = kLeastChangeGain * (static_cast<double>(clocks.size()) - 1);
-  if (clocks.size() < 2 || own - common < least) return {};
-  return clocks;
+  return clocks.size() < 2 || own - common < least ? "" : joined(clocks);
 }
 
 }  // namespace gapfarm

@@ -343,14 +343,7 @@ bool WindowFitter::step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J,
 
 WindowFit WindowFitter::hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
                              const std::vector<char>& held_out) const {
-  WindowFit fit;
-  fit.rows = rows;
-  fit.values = values;
-  fit.residuals = residuals(rows, values);
-  const std::vector<double> use = uses(held_out);
-  rescale(&fit, use);
-  score(&fit, use);
-  return fit;
+  return standing(rows, {values, {}}, uses(held_out));
 }
 
 WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
@@ -358,11 +351,11 @@ WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<c
   const Eigen::VectorXd start =
       values.size() == static_cast<Eigen::Index>(rows.size()) ? values : nominals(rows);
   const std::string key = memo_ != nullptr ? key_of(rows, held_out, start, rounds) : "";
-  if (const auto kept = memo_ != nullptr ? memo_->find(key) : std::nullopt) {
-    return fit_from(rows, held_out, *kept);
-  }
-  WindowFit fit = hold(rows, start, held_out);
   const std::vector<double> use = uses(held_out);
+  if (const auto kept = memo_ != nullptr ? memo_->find(key) : std::nullopt) {
+    return standing(rows, *kept, use);
+  }
+  WindowFit fit = standing(rows, {start, {}}, use);
   for (int round = 0; round < rounds && !rows.empty(); ++round) {
     const double before = fit.objective;
     double damping = 1e-3;
@@ -377,14 +370,11 @@ WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<c
   return fit;
 }
 
-WindowFit WindowFitter::fit_from(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
-                                 const KeptFit& kept) const {
-  WindowFit fit;
-  fit.rows = rows;
-  fit.values = kept.values;
-  fit.scales = kept.scales;
-  fit.residuals = residuals(rows, fit.values);
-  score(&fit, uses(held_out));
+WindowFit WindowFitter::standing(const std::vector<FitRow>& rows, const KeptFit& kept,
+                                 const std::vector<double>& use) const {
+  WindowFit fit{rows, kept.values, kept.scales, residuals(rows, kept.values), {}};
+  if (kept.scales.empty()) rescale(&fit, use);
+  score(&fit, use);
   return fit;
 }
 

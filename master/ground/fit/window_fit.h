@@ -166,8 +166,9 @@ class WindowFitter {
   // Of a row in the reference; -1: it is not there.
   Eigen::Index in_reference(const FitRow& row) const;
   std::vector<Eigen::Vector3d> curvature_shares(const WindowFit& fit) const;
-  WindowFit fit_from(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
-                     const KeptFit& kept) const;
+  // Those of `kept`; without scales, their likeliest.
+  WindowFit standing(const std::vector<FitRow>& rows, const KeptFit& kept,
+                     const std::vector<double>& use) const;
   // A name for this very fit.
   std::string key_of(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                      const Eigen::VectorXd& start, int rounds) const;

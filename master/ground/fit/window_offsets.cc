@@ -22,11 +22,6 @@ constexpr int kOffsetRounds = 6;
 constexpr int kOffsetSteps = 8;  // of weights, a round
 constexpr Eigen::Index kFeatures = 3;
 
-struct CommandedTwist {
-  double ahead_m_s = 0;
-  double rim_m_s = 0;  // of a turn, half the wheels' separation from the middle
-};
-
 // Of robots commanded by v and omega, or by the wheels of two sides.
 class TwistReader {
  public:
@@ -59,7 +54,8 @@ class TwistReader {
 
   bool known() const { return known_; }
   double half_m() const { return half_m_; }
-  CommandedTwist read(const std::vector<double>& values) const {
+  // Ahead, and of the rims: of a turn, half the wheels' separation from the middle; m/s.
+  Eigen::Vector2d read(const std::vector<double>& values) const {
     const Eigen::Map<const Eigen::VectorXd> v(values.data(), ahead_.size());
     return {ahead_.dot(v), rim_.dot(v)};
   }
@@ -102,11 +98,10 @@ Eigen::Vector3d exposure(const TwistReader& reader, const CommandedRun& run, dou
        k < run.commands.size() && run.commands[k].t_s < to_s; ++k) {
     const double end_s = k + 1 < run.commands.size() ? run.commands[k + 1].t_s : to_s;
     const double held_s = std::min(end_s, to_s) - std::max(run.commands[k].t_s, from_s);
-    const CommandedTwist twist = reader.read(run.commands[k].values);
-    if (twist.rim_m_s == 0 || held_s <= 0) continue;
-    const double way = held_s * twist.ahead_m_s;
-    sums += Eigen::Vector3d(way, std::copysign(way, way * twist.rim_m_s),
-                            held_s * std::abs(twist.rim_m_s));
+    const Eigen::Vector2d twist = reader.read(run.commands[k].values);
+    if (twist[1] == 0 || held_s <= 0) continue;
+    const double way = held_s * twist[0];
+    sums += Eigen::Vector3d(way, std::copysign(way, way * twist[1]), held_s * std::abs(twist[1]));
   }
   return sums;
 }

@@ -216,13 +216,8 @@ void GroundReport::judge() {
 }
 
 void GroundReport::clocks() {
-  const auto apart = clocks_apart(fitter_, search_.fit);
-  if (!apart) return;
-  std::string runs;
-  for (const RunClock& clock : *apart) {
-    runs += fmt::format("{}{:+.2f} s in run {}", runs.empty() ? "" : ", ", clock.delay_s,
-                        search_.log.runs[clock.run].run);
-  }
+  const std::string runs = clocks_apart(fitter_, search_);
+  if (runs.empty()) return;
   d_.cautions.push_back("The runs' clocks are apart: from command to pose it takes " + runs +
                         ". Each log's commands and poses need one clock; how late they are on the "
                         "whole is no surer than that.");
