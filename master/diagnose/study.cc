@@ -120,9 +120,7 @@ std::vector<Eigen::Vector3d> Study::unwhiten(const Eigen::VectorXd& rows) const 
 }
 
 std::vector<Eigen::Matrix3d> Study::covariances() const {
-  std::vector<Eigen::Matrix3d> all;
-  for (const ResidualTrial& t : trials) all.push_back(subject->covariance(t, noise));
-  return all;
+  return mapped(trials, [&](const ResidualTrial& t) { return subject->covariance(t, noise); });
 }
 
 void Study::use_noise(const NoiseEstimate& estimate) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
@@ -79,9 +80,7 @@ WindowErrors medians_of(std::span<const WindowRow> windows, WindowError WindowRo
 
 std::vector<double> each(std::span<const WindowRow> windows, WindowError WindowRow::*which,
                          double WindowError::*of) {
-  std::vector<double> errors;
-  for (const WindowRow& row : windows) errors.push_back(row.*which.*of);
-  return errors;
+  return mapped(windows, [&](const WindowRow& row) { return row.*which.*of; });
 }
 
 DrawnRatio drawn_ratio_of(std::span<const WindowRow> windows, double WindowError::*of,
@@ -95,8 +94,7 @@ HorizonRow row_of(std::span<const WindowRow> windows, std::span<const std::size_
   HorizonRow row;
   row.horizon_s = windows.front().horizon_s;
   row.windows = windows.size();
-  std::vector<double> travels;
-  for (const WindowRow& window : windows) travels.push_back(window.travel_m);
+  std::vector<double> travels = mapped(windows, &WindowRow::travel_m);
   row.travel_m = median(travels);
   row.simulation = medians_of(windows, &WindowRow::simulation, row.travel_m);
   row.kinematics = medians_of(windows, &WindowRow::kinematics, row.travel_m);

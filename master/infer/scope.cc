@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 
 namespace gapfarm::infer {
@@ -64,9 +65,7 @@ Forward remembering(Forward forward) {
         (*known)[{unknown[k].at, unknown[k].trials}] = std::move(ends[k]);
       }
     }
-    std::vector<Ends> all;
-    for (const PredictionRequest& p : points) all.push_back(known->at({p.at, p.trials}));
-    return all;
+    return mapped(points, [&](const PredictionRequest& p) { return known->at({p.at, p.trials}); });
   };
 }
 

@@ -205,10 +205,9 @@ TuningStep tuning_step(const Problem& problem, const std::vector<BaseParameter>&
 Result<std::vector<Slope>> base_slopes(Predictor& predictor,
                                        const std::vector<BaseParameter>& parameters,
                                        const std::vector<Pose>& ends, const Study& study) {
-  std::vector<SlopeRequest> steps;
-  for (const BaseParameter& p : parameters) {
-    steps.push_back({p.row, kRelativeStep * study.base.at(p.row)});
-  }
+  std::vector<SlopeRequest> steps = mapped(parameters, [&](const BaseParameter& p) {
+    return SlopeRequest{p.row, kRelativeStep * study.base.at(p.row)};
+  });
   ASSIGN_OR_RETURN(const auto found, slopes_at(predictor, {study.base, ends}, steps));
   std::vector<Slope> slopes;
   for (std::size_t k = 0; k < parameters.size(); ++k) {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/pose/segment.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/fit/signatures.h"
@@ -113,11 +114,7 @@ std::vector<Patch> patch_grid(const Study& study, double radius_m) {
 
 const EffectDiagnoses& push_effect_diagnoses() {
   static const std::vector<EffectDiagnosis> rows = pushed_rows();
-  static const EffectDiagnoses all([] {
-    std::vector<const EffectDiagnosis*> each;
-    for (const EffectDiagnosis& row : rows) each.push_back(&row);
-    return each;
-  }());
+  static const EffectDiagnoses all(mapped(rows, [](const EffectDiagnosis& row) { return &row; }));
   return all;
 }
 

@@ -262,10 +262,9 @@ Result<Study> make_push_study(const Problem& problem, std::span<const Gene> gene
   Study study;
   study.subject = diagnosis_subject(problem);
   study.table = &problem.table();
-  std::vector<DrivenCommand> driven;
-  for (const Trial& trial : log) {
-    driven.push_back({0, 0, trial.tip.back().t_s - trial.tip.front().t_s});
-  }
+  std::vector<DrivenCommand> driven = mapped(log, [](const Trial& trial) {
+    return DrivenCommand{0, 0, trial.tip.back().t_s - trial.tip.front().t_s};
+  });
   const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
   const std::vector<std::size_t> cells = push_cells(problem.log);
   std::map<std::string, std::size_t> sessions;
@@ -327,9 +326,7 @@ Status tune_push_base(Predictor& predictor, bool keep, Study* study) {
 
 std::vector<std::size_t> push_folds(const Study& study) {
   constexpr std::size_t kFolds = 5;
-  std::vector<std::size_t> folds;
-  for (const ResidualTrial& t : study.trials) folds.push_back(t.cell % kFolds);
-  return folds;
+  return mapped(study.trials, [&](const ResidualTrial& t) { return t.cell % kFolds; });
 }
 
 }  // namespace gapfarm

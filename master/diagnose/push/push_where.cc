@@ -4,6 +4,7 @@
 #include <functional>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/parameters/push.h"
 #include "common/score/fitness.h"
 #include "master/diagnose/places/where.h"
@@ -43,9 +44,7 @@ std::vector<WhereCovariate> covariates(std::span<const ResidualTrial> trials,
   const auto add = [&](const std::string& name, double unit, const std::string& each,
                        const std::vector<std::function<double(const ResidualTrial&)>>& of) {
     const auto values = [&](std::size_t i) {
-      std::vector<double> row;
-      for (const auto& f : of) row.push_back(trials[i].push.touched ? f(trials[i]) : 0);
-      return row;
+      return mapped(of, [&](const auto& f) { return trials[i].push.touched ? f(trials[i]) : 0; });
     };
     add_covariate({name, {}, false, false, unit, each}, trials.size(), values, &all);
   };

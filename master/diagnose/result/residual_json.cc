@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
 
@@ -11,11 +12,7 @@ namespace {
 constexpr const char* kAllCommands = "all";
 
 std::vector<std::string> covariate_names() {
-  std::vector<std::string> names;
-  for (const ResidualCovariate& covariate : residual_covariates()) {
-    names.emplace_back(covariate.name);
-  }
-  return names;
+  return mapped(residual_covariates(), [](const auto& c) { return std::string(c.name); });
 }
 
 constexpr auto kTerm = [](auto& v, auto& row) {

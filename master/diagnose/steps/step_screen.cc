@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/digits.h"
 #include "common/math/laws.h"
@@ -246,9 +247,7 @@ Status screen_alone(const DiagnosisRequest& of, const Explanation& found, Screen
 }
 
 std::vector<EffectCandidate> candidates_of(const std::vector<ChosenEffect>& chosen) {
-  std::vector<EffectCandidate> effects;
-  for (const ChosenEffect& c : chosen) effects.push_back(c.candidate);
-  return effects;
+  return mapped(chosen, &ChosenEffect::candidate);
 }
 
 Regression explained_by(const Proposals& catalogue, const Explanation& explanation) {

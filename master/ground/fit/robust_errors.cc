@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
 #include "master/ground/fit/window_prior.h"
@@ -150,9 +151,7 @@ std::vector<std::size_t> held_out_stretches(std::span<const Trial> windows,
   if (units < kEnoughRuns) places = places_of(span_s, runs, false, &units);
   if (units < kEnoughRuns) return equal_parts(windows, count);
   count = std::min(count, units);
-  std::vector<std::size_t> stretches;
-  for (const Trial& w : windows) stretches.push_back(count * places[*w.run] / units);
-  return stretches;
+  return mapped(windows, [&](const Trial& w) { return count * places[*w.run] / units; });
 }
 
 namespace {

@@ -74,8 +74,7 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   std::vector<Climb> climbs;
   if (untold_.size() < 2 || first.slopes.empty()) return climbs;
   const auto starts = spread_starts(start_, untold_, kLooks * untold_.size());
-  std::vector<Hold> holds;
-  for (const Genome& start : starts) holds.push_back({start, 1});
+  std::vector<Hold> holds = mapped(starts, [](const Genome& start) { return Hold{start, 1}; });
   ASSIGN_OR_RETURN(auto looks, look_at(starts, holds));
   for (int round = 0; round < 2; ++round) {
     if (Status s = settle(&looks, holds, first); !s) return s.error();

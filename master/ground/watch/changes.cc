@@ -123,9 +123,7 @@ OddRobot farthest_robot(const Scaled& fleet, const std::vector<RobotFit>& fits) 
 }
 
 std::vector<RobotFit> fit_robots(const Scaled& fleet, const RunVariances& variances) {
-  std::vector<RobotFit> fits;
-  for (const RobotRuns& robot : fleet.robots) fits.push_back(fit_robot(robot, variances));
-  return fits;
+  return mapped(fleet.robots, [&](const RobotRuns& robot) { return fit_robot(robot, variances); });
 }
 
 // Runs of robots without changes: normal ones, with the covariances and variances of these; or
