@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 
 namespace gapfarm {
@@ -96,9 +97,7 @@ std::span<const std::string> command_kind_names() {
 }
 
 const RobotWheel* GroundRobot::wheel(std::string_view wanted) const {
-  const auto found = std::find_if(wheels.begin(), wheels.end(),
-                                  [&](const RobotWheel& w) { return w.name == wanted; });
-  return found == wheels.end() ? nullptr : &*found;
+  return find_by(wheels, wanted, &RobotWheel::name);
 }
 
 const RobotWheel* driven_wheel(const GroundRobot& robot, std::optional<WheelSide> side) {

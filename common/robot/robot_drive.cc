@@ -222,11 +222,10 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
         wanted = angle_of(std::atan(at(commanded, omega_) * *robot_.controller.wheelbase_m / v));
       speed = follow(0, dead(v), dt_s);
     } else {
-      const auto driven = std::find_if(robot_.wheels.begin(), robot_.wheels.end(),
-                                       [](const RobotWheel& w) { return w.driven; });
-      const double radius = driven == robot_.wheels.end() ? 1 : *driven->radius_m;
+      const RobotWheel* driven = driven_wheel(robot_);
+      const double radius = driven == nullptr ? 1 : *driven->radius_m;
       speed = follow(0, dead(at(commanded, speed_)) * radius, dt_s);
-      steered_traction = driven != robot_.wheels.end() && driven->steered;
+      steered_traction = driven != nullptr && driven->steered;
     }
     steer(wanted, dt_s);
     // The middle of the unsteered axle is slower than a steered traction wheel.

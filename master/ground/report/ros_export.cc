@@ -17,13 +17,6 @@
 namespace gapfarm {
 namespace {
 
-const ReportedValue* reported_value(const ReportedValues& reported, const std::string& name) {
-  for (const ReportedValue& v : reported.values) {
-    if (v.name == name) return &v;
-  }
-  return nullptr;
-}
-
 // A product of ratios that are 1 in the robot's file, times what the file has.
 ReportedValue product(const ReportedValues& reported, const std::string& key, double had,
                       std::initializer_list<const char*> over,
@@ -31,7 +24,7 @@ ReportedValue product(const ReportedValues& reported, const std::string& key, do
   ReportedValue row{key, had, had, {had, had}, false};
   double least = had, most = had;
   const auto take = [&](const char* name, bool divide) {
-    const ReportedValue* v = reported_value(reported, name);
+    const ReportedValue* v = find_by(reported.values, name, &ReportedValue::name);
     if (v == nullptr || !v->named || v->reported <= 0 || v->interval.lower <= 0) return;
     row.named = true;
     row.reported = divide ? row.reported / v->reported : row.reported * v->reported;
@@ -119,7 +112,7 @@ std::vector<ReportedValue> robot_sizes(const ReportedValues& reported) {
   for (const auto& [key, name] : {std::pair{"marker.x", "marker_x"},
                                   {"marker.y", "marker_y"},
                                   {"marker.yaw", "marker_yaw"}}) {
-    const ReportedValue* v = reported_value(reported, name);
+    const ReportedValue* v = find_by(reported.values, name, &ReportedValue::name);
     if (v == nullptr) continue;
     rows.push_back(*v);
     rows.back().name = key;
@@ -146,7 +139,7 @@ std::vector<std::string> ros_remarks(const ReportedValues& reported) {
   };
   std::vector<std::string> remarks;
   for (const Word& word : kLabels) {
-    const ReportedValue* v = reported_value(reported, word.name);
+    const ReportedValue* v = find_by(reported.values, word.name, &ReportedValue::name);
     if (v == nullptr || !v->named) continue;
     remarks.push_back(fmt::format("{}: {:.4g} [{:.4g}, {:.4g}] {}; you have {:.4g}", word.text,
                                   v->reported, v->interval.lower, v->interval.upper, word.unit,
@@ -158,7 +151,7 @@ std::vector<std::string> ros_remarks(const ReportedValues& reported) {
 RosFriction ros_friction(const ReportedValues& reported) {
   const GroundRobot& robot = reported.given;
   RosFriction friction;
-  if (const ReportedValue* grip = reported_value(reported, "grip");
+  if (const ReportedValue* grip = find_by(reported.values, "grip", &ReportedValue::name);
       grip != nullptr && grip->named) {
     friction.across = std::exp(grip->reported) / kGravity_m_s2;
     friction.from = fmt::format("friction across {:.3g} [{:.3g}, {:.3g}], from how hard it corners",
@@ -167,7 +160,7 @@ RosFriction ros_friction(const ReportedValues& reported) {
     friction.along = friction.across;
     return friction;
   }
-  const ReportedValue* turn = reported_value(reported, "separation");
+  const ReportedValue* turn = find_by(reported.values, "separation", &ReportedValue::name);
   const double own = robot.controller.wheel_separation_multiplier;
   if (!skids(robot) || turn == nullptr || !turn->named || own < 1.01) return friction;
   const auto ratio = [&](double times) {

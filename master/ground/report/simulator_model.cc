@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 
+#include "common/base/ranges.h"
 namespace gapfarm {
 namespace {
 
@@ -24,12 +25,6 @@ constexpr SimulatorPlace kPlaces[] = {
     {"mass", "body chassis: inertial mass", "link chassis: mass"},
     {"yaw_inertia", "body chassis: inertial diaginertia", "link chassis: izz"},
 };
-
-const SimulatorPlace* place_of(std::string_view value) {
-  const auto* found = std::find_if(std::begin(kPlaces), std::end(kPlaces),
-                                   [&](const SimulatorPlace& p) { return p.value == value; });
-  return found == std::end(kPlaces) ? nullptr : found;
-}
 
 constexpr double kWheelMass = 0.02;  // of each wheel, of the robot's
 // Of a wheel, of the robot's mass and a radius squared: contacts of wheels that are much lighter
@@ -102,12 +97,12 @@ std::string actuator(const char* side, double lag_s, double kv) {
 }  // namespace
 
 std::string_view mujoco_place(std::string_view value) {
-  const SimulatorPlace* place = place_of(value);
+  const SimulatorPlace* place = find_by(kPlaces, value, &SimulatorPlace::value);
   return place == nullptr ? std::string_view() : place->mujoco;
 }
 
 std::string_view sdf_place(std::string_view value) {
-  const SimulatorPlace* place = place_of(value);
+  const SimulatorPlace* place = find_by(kPlaces, value, &SimulatorPlace::value);
   return place == nullptr ? std::string_view() : place->sdf;
 }
 
