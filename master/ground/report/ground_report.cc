@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/report/ground_text.h"
@@ -314,11 +316,8 @@ void GroundReport::name_headline() {
                        : " no other value, but not all is explained by that.";
   }
   if (d_.effects.size() > 1) {
-    d_.headline += " Beside it: ";
-    for (std::size_t k = 1; k < d_.effects.size(); ++k) {
-      d_.headline += (k > 1 ? ", " : "") + d_.effects[k].name;
-    }
-    d_.headline += ".";
+    d_.headline +=
+        " Beside it: " + joined(std::span(d_.effects).subspan(1), ", ", &NamedEffect::name) + ".";
   }
 }
 

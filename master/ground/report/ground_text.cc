@@ -328,8 +328,7 @@ std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& sea
     if (of != search.catalogue.end() && !contains(things, of->thing)) things.push_back(of->thing);
   }
   if (things.empty()) return "";
-  return "These runs do not show whether these are right: " +
-         joined(things, ", ", [](const std::string& thing) { return thing; }) + ".";
+  return "These runs do not show whether these are right: " + joined(things) + ".";
 }
 
 std::string values_that_would_move(const GroundSearch& search) {
@@ -341,11 +340,8 @@ std::string values_that_would_move(const GroundSearch& search) {
     moved.emplace_back(-std::abs(by) / row.row.tolerance, value_move(row, by));
   }
   std::sort(moved.begin(), moved.end());
-  std::string text;
-  for (std::size_t k = 0; k < std::min(moved.size(), kMostMoved); ++k) {
-    text += (k > 0 ? ", " : "") + moved[k].second;
-  }
-  return text;
+  moved.resize(std::min(moved.size(), kMostMoved));
+  return joined(moved, ", ", [](const auto& value) { return value.second; });
 }
 
 }  // namespace gapfarm

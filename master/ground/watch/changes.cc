@@ -38,10 +38,13 @@ struct Scaled {
   VectorXd owned;  // variances
 };
 
+VectorXd tolerances_of(const WatchedRows& rows) {
+  const std::vector<double> all = mapped(rows.rows, &KinematicRow::tolerance);
+  return VectorXd::Map(all.data(), static_cast<Index>(all.size()));
+}
+
 Scaled scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots) {
-  const auto p = static_cast<Index>(rows.rows.size());
-  VectorXd per(p);
-  for (Index k = 0; k < p; ++k) per[k] = 1 / rows.rows[static_cast<std::size_t>(k)].tolerance;
+  const VectorXd per = tolerances_of(rows).cwiseInverse();
   Scaled fleet;
   fleet.owned = rows.owned.cwiseProduct(per).cwiseAbs2();
   for (const WatchedValue& value : rows.values) {
@@ -357,8 +360,7 @@ FleetChanges find_changes(const WatchedRows& rows,
   result.steps = describe_steps(rows, fleet, variances, found);
   std::vector<RobotFit> fits = fit_robots(fleet, variances);
   const Shared shared = estimate_shared(fits, fleet.owned, -1);
-  VectorXd units(p);
-  for (Index k = 0; k < p; ++k) units[k] = rows.rows[static_cast<std::size_t>(k)].tolerance;
+  const VectorXd units = tolerances_of(rows);
   result.dispersion = variances.dispersion;
   result.run_deviations = variances.between.cwiseSqrt().cwiseProduct(units);
   result.robot_deviations = shared.between.cwiseSqrt().cwiseProduct(units);
