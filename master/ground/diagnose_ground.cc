@@ -49,10 +49,9 @@ Result<GroundRobot> sense(const GroundRobot& robot, const GroundDiagnoseOptions&
 Status exclude(const std::vector<std::string>& names, std::vector<GroundHypothesis>* catalogue) {
   for (const std::string& name : names) {
     const auto wanted = [&](const GroundHypothesis& h) { return h.name == name; };
-    if (std::none_of(catalogue->begin(), catalogue->end(), wanted)) {
+    if (std::erase_if(*catalogue, wanted) == 0) {
       return Error{"--exclude: this robot's catalogue has no \"" + name + "\""};
     }
-    std::erase_if(*catalogue, wanted);
   }
   return {};
 }

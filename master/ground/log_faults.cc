@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
@@ -94,11 +95,8 @@ PoseGrid grid_of(const RunLog& log) {
 void drop_stale_frames(GroundSearch* search) {
   // An increment of nothing is a motion that was not seen: no later one shows it.
   if (search->log.relative) return;
-  std::vector<std::vector<Pose>> tracks;
-  for (const LoggedRun& run : search->log.runs) {
-    std::vector<Pose>& track = tracks.emplace_back();
-    for (const PoseRow& row : run.poses) track.push_back(row.X_WM);
-  }
+  const std::vector<std::vector<Pose>> tracks = mapped(
+      search->log.runs, [](const LoggedRun& run) { return mapped(run.poses, &PoseRow::X_WM); });
   const double step_m = grid_of(search->log).step_m;
   search->stale = count_stale(tracks, step_m);
   if (search->stale.repeats == 0) return;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/guarded.h"
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
@@ -125,8 +126,7 @@ class ProgramFarm {
     std::vector<std::vector<double>> missing;
     for (const Kinematics& at : points) {
       auto values = asked_values(at);
-      const bool there = find(known, values) != nullptr ||
-                         std::find(missing.begin(), missing.end(), values) != missing.end();
+      const bool there = find(known, values) != nullptr || contains(missing, values);
       if (!there) missing.push_back(std::move(values));
     }
     std::vector<v1::Task> tasks;
@@ -168,9 +168,7 @@ GroundRobot robot_of(const Problem& problem, const Pose& X_RM) {
   return robot;
 }
 
-bool is_around(const KinematicRow& row) {
-  return std::find(std::begin(kAround), std::end(kAround), row.name) != std::end(kAround);
-}
+bool is_around(const KinematicRow& row) { return contains(kAround, row.name); }
 
 KinematicRow channel_row(const Problem& problem, const std::string& channel, const char* of,
                          double tolerance) {
@@ -314,9 +312,7 @@ Result<GroundDiagnosis> diagnose_program_runs(Farm& farm, const std::vector<Gene
     RETURN_IF_ERROR(program.failure());
     if (!found) return found;
     for (const ReportedValue& value : found->values) {
-      const bool is_tuned = std::any_of(rows.begin(), rows.end(), [&](const KinematicRow& row) {
-        return row.name == value.name;
-      });
+      const bool is_tuned = contains(rows, value.name, &KinematicRow::name);
       if (value.named || is_tuned) put_value(value.name, value.reported, problem);
     }
     return found;

@@ -118,8 +118,7 @@ HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const
   for (const std::vector<double>& times : draw_blocks(windows, seed, 0)) {
     drawn.push_back(weighted(gains, times) / std::max(1.0, weighted(counts, times)));
   }
-  double sum = 0;
-  for (const double gain : gains) sum += gain;
+  const double sum = weighted(gains, std::vector<double>(gains.size(), 1.0));
   return with_interval(sum / static_cast<double>(with.nats.size()), std::move(drawn));
 }
 

@@ -287,7 +287,7 @@ void WindowFitter::normal_equations(const WindowFit& fit, const std::vector<Eige
   }
   const Eigen::MatrixXd P = prior_precision(fit.rows);
   *H += P;
-  *g += P * from_middle(fit.rows, fit.values);
+  *g += P * (fit.values - nominals(fit.rows));
 }
 
 double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,

@@ -159,9 +159,8 @@ class WindowFitter {
   bool step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J, const std::vector<double>& use,
             double* damping) const;
   std::vector<double> uses(const std::vector<char>& held_out) const;
-  // Of the prior of these rows, and how far from its middle the values are.
+  // Of the prior of these rows, whose middle are their nominals.
   Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
-  Eigen::VectorXd from_middle(const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
   double prior(const WindowFit& fit) const;
   // Of a row in the reference; -1: it is not there.
   Eigen::Index in_reference(const FitRow& row) const;

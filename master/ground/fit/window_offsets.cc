@@ -204,7 +204,7 @@ OffsetFit WindowFitter::fit_with_offsets(WindowFit fit) {
       }
       rescale(&fit, use);
       const std::vector<Eigen::Vector3d> curvature = curvature_shares(fit);
-      away << from_middle(fit.rows, fit.values) + step.head(n), offsets + step.tail(m);
+      away << fit.values - nominals(fit.rows) + step.head(n), offsets + step.tail(m);
       H = P;
       Eigen::MatrixXd A = P;
       Eigen::VectorXd g = P * away;

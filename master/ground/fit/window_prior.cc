@@ -93,18 +93,9 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
   return inverse_of_symmetric(covariance);
 }
 
-Eigen::VectorXd WindowFitter::from_middle(const std::vector<FitRow>& rows,
-                                          const Eigen::VectorXd& values) const {
-  Eigen::VectorXd away = values;
-  for (Eigen::Index k = 0; k < values.size(); ++k) {
-    away[k] -= rows[k].row.nominal;
-  }
-  return away;
-}
-
 double WindowFitter::prior(const WindowFit& fit) const {
   if (fit.rows.empty()) return 0;
-  const Eigen::VectorXd away = from_middle(fit.rows, fit.values);
+  const Eigen::VectorXd away = fit.values - nominals(fit.rows);
   return -away.dot(prior_precision(fit.rows) * away) / 2;
 }
 
@@ -148,7 +139,7 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bo
     }
   }
   const Eigen::MatrixXd P = prior_precision(fit.rows);
-  const Eigen::VectorXd away = from_middle(fit.rows, fit.values);
+  const Eigen::VectorXd away = fit.values - nominals(fit.rows);
   const std::vector<std::vector<double>> all_times = draw_blocks(windows_, seed, 1);
   Eigen::MatrixXd drawn(n, kGroundDraws);
   Stream stream({seed, Purpose::kStatistics, 4, 0, 0});

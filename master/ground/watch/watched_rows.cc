@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/watch/changes.h"
 
@@ -38,11 +39,9 @@ WatchedRows watched_rows(const GroundRobot& robot) {
     for (const KinematicRow& other : kept) {
       if (other.name == row.name) watched.owned[k] = other.tolerance;
     }
-    const auto frees = [&](const GroundHypothesis& h) {
-      return std::any_of(h.freed.begin(), h.freed.end(),
-                         [&](const KinematicRow& r) { return r.name == row.name; });
-    };
-    const auto h = std::find_if(catalogue.begin(), catalogue.end(), frees);
+    const auto h = std::ranges::find_if(catalogue, [&](const GroundHypothesis& of) {
+      return contains(of.freed, row.name, &KinematicRow::name);
+    });
     if (h != catalogue.end()) add(*h, row, Eigen::VectorXd::Unit(p, k));
   }
   // All wheels alike.
