@@ -2,6 +2,7 @@
 //
 // A step looks at finger and face where they are half a step later if the piece keeps its velocity,
 // so that ways converge with the square of the step.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -93,7 +94,8 @@ void DistributedPush::reset(const Floor& table, const Eigen::Vector3d& velocity)
   velocity_ = velocity;
   step_.reset();
   for (auto* of_points : {&points_.x, &points_.y, &points_.extent, &points_.impulse}) {
-    of_points->assign(face_.size(), 0);
+    of_points->assign((face_.size() + FaceStep::kBlock - 1) / FaceStep::kBlock * FaceStep::kBlock,
+                      0);
   }
   for (std::size_t i = 0; i < face_.size(); ++i) points_.extent[i] = face_[i].extent_m;
   // Friction is mu / sqrt(ratio) along the grain and mu sqrt(ratio) across it.
@@ -105,6 +107,7 @@ void DistributedPush::place_points(const Pose& X_SM, double dt) {
   const double angle = X_SM.theta - table_.grain_direction_rad;
   const double c = std::cos(angle), s = std::sin(angle);
   const double whole = settings_.ground_friction * load_n_ * dt;
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(X_SM.theta).toRotationMatrix();
   const bool varies = table_.speed_slope_s_m != 0 ||
                       std::any_of(table_.patches.begin(), table_.patches.end(),
                                   [](const FrictionDisc& disc) { return disc.ratio != 1; });
@@ -114,11 +117,14 @@ void DistributedPush::place_points(const Pose& X_SM, double dt) {
     points_.y[i] = s * r[0] + c * r[1];
     points_.impulse[i] = whole * face_[i].share;
     if (!varies) continue;
-    const Eigen::Vector2d arm = turned(X_SM.theta, r);
-    const double speed =
-        std::hypot(velocity_[0] - velocity_[2] * arm[1], velocity_[1] + velocity_[2] * arm[0]);
-    points_.impulse[i] *= std::max(kLeastGain, 1 + table_.speed_slope_s_m * speed) *
-                          patch_factor(table_, X_SM.x + arm[0], X_SM.y + arm[1]);
+    const Eigen::Vector2d arm = turn * r;
+    double gain = 1;
+    if (table_.speed_slope_s_m != 0) {
+      const double speed =
+          std::hypot(velocity_[0] - velocity_[2] * arm[1], velocity_[1] + velocity_[2] * arm[0]);
+      gain = std::max(kLeastGain, 1 + table_.speed_slope_s_m * speed);
+    }
+    points_.impulse[i] *= gain * patch_factor(table_, X_SM.x + arm[0], X_SM.y + arm[1]);
   }
 }
 

@@ -19,31 +19,38 @@ struct Resistance {
 };
 
 // Of the dissipation.  Without `curved` the Hessian is that of a quadratic above it that touches it
-// here: steps with it never overshoot.
+// here: steps with it never overshoot.  What a point adds is found for a block of points at a time,
+// because this is where a worker spends most of its time; the sums go from point to point.
 Resistance resistance(const FaceStep::Points& points, const Eigen::Vector3d& V, bool curved) {
+  using Block = Eigen::Array<double, FaceStep::kBlock, 1>;
+  Eigen::Array<double, FaceStep::kBlock, 9> added;
   double g0 = 0, g1 = 0, g2 = 0;
   double h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0;
   const double qx = points.q_x, qy = points.q_y, keep = curved ? 1 : 0;
-  const std::size_t n = points.x.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    const double x = points.x[i], y = points.y[i], e2 = points.extent[i] * points.extent[i];
-    const double ux = V[0] - V[2] * y, uy = V[1] + V[2] * x;
-    const double rho2 = qx * ux * ux + qy * uy * uy + e2 * V[2] * V[2] + kCreep_m_s * kCreep_m_s;
-    const double rho = std::sqrt(rho2);
-    const double k = points.impulse[i] / rho;
+  for (std::size_t i = 0; i < points.x.size(); i += FaceStep::kBlock) {
+    const Block x = Block::Map(&points.x[i]), y = Block::Map(&points.y[i]);
+    const Block e2 = Block::Map(&points.extent[i]).square();
+    const Block ux = V[0] - V[2] * y, uy = V[1] + V[2] * x;
+    const Block rho2 = qx * ux * ux + qy * uy * uy + e2 * V[2] * V[2] + kCreep_m_s * kCreep_m_s;
+    const Block k = Block::Map(&points.impulse[i]) / rho2.sqrt();
     // J' Q z, and from it the gradient.
-    const double a = qx * ux, b = qy * uy;
-    const double c = x * b - y * a + e2 * V[2];
-    g0 += k * a;
-    g1 += k * b;
-    g2 += k * c;
-    const double l = keep * k / rho2;
-    h00 += k * qx - l * a * a;
-    h01 -= l * a * b;
-    h02 -= k * qx * y + l * a * c;
-    h11 += k * qy - l * b * b;
-    h12 += k * qy * x - l * b * c;
-    h22 += k * (qx * y * y + qy * x * x + e2) - l * c * c;
+    const Block a = qx * ux, b = qy * uy;
+    const Block c = x * b - y * a + e2 * V[2];
+    const Block l = keep * k / rho2;
+    added.col(0) = k * a;
+    added.col(1) = k * b;
+    added.col(2) = k * c;
+    added.col(3) = k * qx - l * a * a;
+    added.col(4) = -(l * a * b);
+    added.col(5) = -(k * qx * y + l * a * c);
+    added.col(6) = k * qy - l * b * b;
+    added.col(7) = k * qy * x - l * b * c;
+    added.col(8) = k * (qx * y * y + qy * x * x + e2) - l * c * c;
+    for (Eigen::Index j = 0; j < added.rows(); ++j) {
+      g0 += added(j, 0), g1 += added(j, 1), g2 += added(j, 2);
+      h00 += added(j, 3), h01 += added(j, 4), h02 += added(j, 5);
+      h11 += added(j, 6), h12 += added(j, 7), h22 += added(j, 8);
+    }
   }
   Resistance r;
   r.gradient << g0, g1, g2;

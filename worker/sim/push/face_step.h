@@ -32,8 +32,12 @@ struct FingerTouch {
 
 class FaceStep {
  public:
+  // Points that are taken at a time: as many as a register of any CPU holds.
+  static constexpr std::size_t kBlock = 2;
+
   // Points: arms from the centre of mass and extents, m; the greatest friction impulses of the
-  // step, N s.  The weights q of the squared velocities along the axes.
+  // step, N s.  The weights q of the squared velocities along the axes.  REQUIRES: whole blocks,
+  // which points without any impulse fill up.
   struct Points {
     std::vector<double> x, y, extent, impulse;
     double q_x = 1, q_y = 1;

@@ -49,6 +49,8 @@ struct PushSettings {
   double angular_damping = 0;
   double error_reduction = 0.2;    // share of a contact's depth repaired a step
   double contact_softness = 1e-3;  // Bullet's CFM of the table's contacts, m s / kg
+
+  bool operator==(const PushSettings&) const = default;
 };
 
 struct FingerSample {
