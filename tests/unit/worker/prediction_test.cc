@@ -98,7 +98,7 @@ TEST(Prediction, MotionsThatOnlyTheViewReportsApartAreSimulatedOnce) {
 }
 
 TEST(MotionMemo, GivesBackWhatItKeptAndKeepsTheLast) {
-  MotionMemo memo(3);
+  MotionMemo<MotionKey> memo(3);
   MotionKey key;
   const auto motion_of = [](int k) {
     Motion motion;
@@ -116,6 +116,12 @@ TEST(MotionMemo, GivesBackWhatItKeptAndKeepsTheLast) {
   EXPECT_FALSE(memo.find(key));
   key = {};
   EXPECT_FALSE(memo.find(key));  // long ago
+  memo.keep(key, motion_of(0));
+  for (int k = 9; k < 18; ++k) {
+    EXPECT_TRUE(memo.find({}));  // and so not long ago
+    key.floor.nap_direction_rad = k;
+    memo.keep(key, motion_of(k));
+  }
 }
 
 // Fewer trials of a condition than interpolation has nodes are simulated at their own headings, and

@@ -173,6 +173,28 @@ TEST(PushScenario, APieceWithAShapeFactorOfItsOwnUsesIt) {
   EXPECT_NE(end_of(own, 1), end_of(shared, 1));
 }
 
+// A derivative moves some pushes and not the others: those that a worker remembers are what it
+// would simulate, to the bit.
+TEST(PushScenario, RemembersWhatItWouldSimulate) {
+  Problem problem = push_problem();
+  problem.values[row_of(Push::kModel)] = 2;
+  const auto worker = prepare(to_proto(problem));
+  ASSERT_TRUE(worker.ok());
+  for (const char* moved : {"step_rate", "pressure_1", "pressure_2", "ground_friction",
+                            "friction_patch.ratio", "placement_bias.x", "camera_scale"}) {
+    const std::size_t row = push_table().row(moved);
+    v1::Task task;
+    task.mutable_predict()->set_means_only(true);
+    v1::Override* there = task.mutable_predict()->mutable_point()->add_overrides();
+    there->set_parameter(static_cast<std::uint32_t>(row));
+    there->set_value(problem.values[row] * 1.1 + (problem.values[row] == 0 ? 0.3 : 0));
+    const auto fresh = prepare(to_proto(problem));
+    EXPECT_EQ(evaluate(worker->get(), task).SerializeAsString(),
+              evaluate(fresh->get(), task).SerializeAsString())
+        << moved;
+  }
+}
+
 TEST(PushScenario, FitnessIsTheMeanCornerDistance) {
   const Problem problem = push_problem();
   const v1::TaskResult ends = predicted(problem);

@@ -10,132 +10,12 @@
 #include "common/random/stream.h"
 #include "common/score/fitness.h"
 #include "gapfarm/v1/task.pb.h"
-#include "worker/effects/behaviour.h"
-#include "worker/scenarios/outcome.h"
+#include "worker/scenarios/push/pushed_piece.h"
 #include "worker/scenarios/scenario.h"
-#include "worker/sim/push/push.h"
 #include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 namespace {
-
-struct PushNoise {
-  double slide = 0;       // s.d. of the end position over the distance slid
-  double turn_rad_m = 0;  // s.d. of the end heading over the distance slid
-  PoseNoise pose;         // of a reading
-};
-
-// Poses with R are the true ones of the frame that the log follows.
-class PushedPiece {
- public:
-  PushedPiece(const Piece& piece, std::size_t index, const ParameterValues& values);
-
-  const Piece& piece() const { return piece_; }
-  // The true start of a piece logged there, what is logged of a true pose, and of a true start.
-  Pose start_of(const Pose& X_WM) const;
-  Pose observe(const Pose& X_WR) const;
-  Pose logged_start(const Pose& X_WR) const { return effects_.unplace(X_WR); }
-
-  struct Push {
-    v1::Outcome outcome = v1::OK;
-    Pose X_WE;
-    double slid_m = 0;  // from the centroid's start to its end
-    Motion motion;
-  };
-  // `path` receives true poses of the log's frame in the world.
-  Push push(const Pose& X_WR, std::span<const TipSample> tip,
-            std::vector<PathSample>* path = nullptr, double interval_s = 0);
-
-  double simulated_s() const { return simulated_s_; }
-  unsigned runs() const { return runs_; }
-
- private:
-  const Piece& piece_;
-  ActiveEffects effects_;
-  double camera_scale_;  // logged lengths over true ones
-  Pose X_RC_;            // centroid in the log's frame
-  PushSimulator simulator_;
-  double simulated_s_ = 0;
-  unsigned runs_ = 0;
-};
-
-double at(const ParameterValues& values, Push row) { return values[row_of(row)]; }
-
-// The piece's own value, if it has one, else that of all.
-double own_or(std::size_t index, Push first_own, Push of_all, const ParameterValues& values) {
-  const double own = index < kOwnShapeFactors ? values[row_of(first_own) + index] : 0.0;
-  return own > 0 ? own : at(values, of_all);
-}
-
-PushNoise push_noise(const ParameterValues& values) {
-  return {at(values, Push::kPushNoiseSlide),
-          at(values, Push::kPushNoiseTurn),
-          {at(values, Push::kPoseNoisePosition), at(values, Push::kPoseNoiseHeading)}};
-}
-
-// `index`: of the piece in the problem, for a shape factor of its own.
-PushSettings push_settings(const Piece& piece, std::size_t index, const ParameterValues& values,
-                           const ActiveEffects& effects) {
-  PushSettings s;
-#define ROW(name, row)
-#define SETTING(name, member, row) put(at(values, Push::name), s.member);
-#include "common/parameters/push_rows.inc"
-  const Eigen::Vector2d middle = centroid(piece);
-  for (const Eigen::Vector2d& corner : piece.corners) s.corners.push_back(corner - middle);
-  s.thickness_m = piece.thickness_m;
-  s.mass_kg = piece.mass_kg * at(values, Push::kMassFactor);
-  const Eigen::Vector3d moments = second_moments(piece);
-  s.gyration_m2 = moments[0] + moments[1];
-  s.shape_factor = own_or(index, Push::kShapeFactor1, Push::kShapeFactor, values);
-  s.pressure = own_or(index, Push::kPressure1, Push::kPressure, values);
-  effects.push(s);
-  return s;
-}
-
-PushedPiece::PushedPiece(const Piece& piece, std::size_t index, const ParameterValues& values)
-    : piece_(piece),
-      effects_(push_table(), values),
-      camera_scale_(at(values, gapfarm::Push::kCameraScale)),
-      X_RC_{centroid(piece)[0], centroid(piece)[1], 0},
-      simulator_(push_settings(piece, index, values, effects_)) {}
-
-Pose PushedPiece::start_of(const Pose& X_WM) const {
-  return effects_.place(
-      effects_.recover({X_WM.x / camera_scale_, X_WM.y / camera_scale_, X_WM.theta}));
-}
-
-Pose PushedPiece::observe(const Pose& X_WR) const {
-  const Pose X_WM = effects_.observe(X_WR);
-  return {X_WM.x * camera_scale_, X_WM.y * camera_scale_, X_WM.theta};
-}
-
-PushedPiece::Push PushedPiece::push(const Pose& X_WR, std::span<const TipSample> tip,
-                                    std::vector<PathSample>* path, double interval_s) {
-  const Pose X_WS = X_WR * X_RC_;
-  std::vector<FingerSample> finger;
-  for (const TipSample& sample : tip) {
-    const Pose p_SF = between(X_WS, {sample.x, sample.y, 0});
-    finger.push_back({sample.t_s, {p_SF.x, p_SF.y}});
-  }
-  Floor table;
-  Situation situation;
-  situation.X_WR = X_WS;
-  effects_.floor(situation, table);
-  std::vector<MotionSample> samples;
-  Push push;
-  push.motion = simulator_.run(finger, table, path ? &samples : nullptr, interval_s);
-  push.outcome = to_outcome(push.motion.outcome);
-  push.slid_m = std::hypot(push.motion.X_SE.x, push.motion.X_SE.y);
-  const Pose X_CR = inverse(X_RC_);
-  push.X_WE = X_WS * push.motion.X_SE * X_CR;
-  if (path) {
-    path->clear();
-    for (const MotionSample& s : samples) path->push_back({s.t_s, X_WS * s.X_SB * X_CR});
-  }
-  simulated_s_ += push.motion.duration_s;
-  ++runs_;
-  return push;
-}
 
 class PushSession {
  public:
@@ -298,6 +178,7 @@ class PushModelOfLog : public ScenarioModel {
   Offsets offsets(const PushNoise& noise, const PredictOptions& options, std::uint32_t trial) const;
 
   const Problem& problem_;
+  mutable MotionMemo<PushKey> memo_;
 };
 
 Offsets PushModelOfLog::offsets(const PushNoise& noise, const PredictOptions& options,
@@ -338,6 +219,8 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
   Prediction prediction;
   prediction.facts.resize(problem_.commands.size());
   const PushNoise noise = push_noise(values);
+  // A search never comes back to a genome; a derivative moves some pieces, and not the others.
+  MotionMemo<PushKey>* memo = options.means_only ? &memo_ : nullptr;
   std::map<std::size_t, PushedPiece> pieces;
   std::vector<std::uint32_t> wanted(options.trials.begin(), options.trials.end());
   if (wanted.empty()) {
@@ -352,7 +235,7 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
     std::vector<Pose> ends;
     double slid_m = 0;
     for (const Eigen::Vector3d& o : offsets(noise, options, i)) {
-      const PushedPiece::Push push = pushed.push(X_WR * Pose{o[0], o[1], o[2]}, trial.tip);
+      const PushedPiece::Push push = pushed.push(X_WR * Pose{o[0], o[1], o[2]}, i, trial.tip, memo);
       count_step(options.steps);  // a push takes milliseconds: fine enough to see one that hangs
       if (push.outcome != v1::OK) {
         prediction.outcome = push.outcome;

@@ -152,7 +152,7 @@ class Srv1Model : public ScenarioModel {
   std::vector<PreparedTrial> trials_;
   Grouping by_drive_;
   Grouping by_drive_and_last_;
-  mutable MotionMemo memo_;
+  mutable MotionMemo<MotionKey> memo_;
 };
 
 std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions& options,

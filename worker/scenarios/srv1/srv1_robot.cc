@@ -2,55 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <utility>
 
 #include "common/score/motion_model.h"
 
 namespace gapfarm {
 
-// Of what differs among the motions of one log and of the derivatives of its predictions.
-std::size_t MotionMemo::Hash::operator()(const MotionKey& key) const {
-  std::size_t hash = 0;
-  const auto add = [&](double value) {
-    hash = (hash ^ std::hash<double>()(value)) * 0x9e3779b97f4a7c15;
-    hash ^= hash >> 32;
-  };
-  const SimSettings& s = key.settings;
-  for (const double v : {s.contact_length_m, s.track_gauge_m, s.friction, s.friction_ratio,
-                         s.tread_creep, s.com_x_m, s.com_y_m, s.step_rate_hz}) {
-    add(v);
-  }
-  for (const SideDrive& side : {key.drive.left, key.drive.right}) {
-    for (const double v : {side.speed_m_s, side.lag_s, side.dead_travel_m}) add(v);
-  }
-  const Floor& f = key.floor;
-  for (const double v : {key.drive.duration_s, f.tilt_rad, f.tilt_direction_rad, f.nap_strength,
-                         f.nap_direction_rad, f.rolling_resistance}) {
-    add(v);
-  }
-  for (const FrictionDisc& disc : f.patches) {
-    for (const double v : {disc.x_m, disc.y_m, disc.radius_m, disc.ratio}) add(v);
-  }
-  return hash;
-}
-
-std::optional<Motion> MotionMemo::find(const MotionKey& key) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  for (const Motions* motions : {&young_, &old_}) {
-    const auto found = motions->find(key);
-    if (found != motions->end()) return found->second;
-  }
-  return std::nullopt;
-}
-
-void MotionMemo::keep(const MotionKey& key, const Motion& motion) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (young_.size() >= most_) {
-    old_ = std::move(young_);
-    young_.clear();
-  }
-  young_.emplace(key, motion);
+std::size_t MotionKey::hash() const {
+  const SimSettings& s = settings;
+  const SideDrive &left = drive.left, &right = drive.right;
+  return hash_of(floor, hash_of({s.contact_length_m, s.track_gauge_m, s.friction, s.friction_ratio,
+                                 s.tread_creep, s.com_x_m, s.com_y_m, s.step_rate_hz,
+                                 left.speed_m_s, left.lag_s, left.dead_travel_m, right.speed_m_s,
+                                 right.lag_s, right.dead_travel_m, drive.duration_s}));
 }
 
 namespace {
@@ -77,7 +41,7 @@ NoiseSettings noise_of(const Problem& problem, const ParameterValues& values) {
 
 class BulletVehicle final : public Vehicle {
  public:
-  BulletVehicle(const SimSettings& settings, StepCounter* steps, MotionMemo* memo)
+  BulletVehicle(const SimSettings& settings, StepCounter* steps, MotionMemo<MotionKey>* memo)
       : simulator_(settings, steps), memo_(memo) {}
   Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
              double interval_s) override {
@@ -91,7 +55,7 @@ class BulletVehicle final : public Vehicle {
 
  private:
   Simulator simulator_;
-  MotionMemo* memo_;
+  MotionMemo<MotionKey>* memo_;
 };
 
 constexpr double kReadingInterval_s = 0.02;  // between the poses that a stale reading may find
@@ -295,7 +259,7 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
 
 std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
                                       const ActiveEffects& effects, StepCounter* steps,
-                                      MotionMemo* memo) {
+                                      MotionMemo<MotionKey>* memo) {
   if (problem.external) return make_external_vehicle(problem, values, steps);
   return std::make_unique<BulletVehicle>(sim_settings(problem.treads().size(), values, effects),
                                          steps, memo);
@@ -305,7 +269,7 @@ Srv1Robot::Srv1Robot(const ParameterValues& values, StepCounter* steps)
     : Srv1Robot(Problem{}, values, steps, nullptr) {}
 
 Srv1Robot::Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps,
-                     MotionMemo* memo)
+                     MotionMemo<MotionKey>* memo)
     : effects_(problem.table(), values),
       noise_(noise_of(problem, values)),
       full_speed_m_s_(problem.external ? 1 : at(values, Srv1::kFullSpeed)),

@@ -3,9 +3,6 @@
 
 #include <cstddef>
 #include <memory>
-#include <mutex>
-#include <optional>
-#include <unordered_map>
 #include <vector>
 
 #include "common/parameters/table.h"
@@ -15,6 +12,7 @@
 #include "common/trials/context.h"
 #include "gapfarm/v1/task.pb.h"
 #include "worker/effects/behaviour.h"
+#include "worker/scenarios/motion_memo.h"
 #include "worker/scenarios/outcome.h"
 #include "worker/sim/robot/motion.h"
 #include "worker/sim/robot/simulator.h"
@@ -29,26 +27,8 @@ struct MotionKey {
   Floor floor;
 
   bool operator==(const MotionKey&) const = default;
-};
-
-// A simulation is a function of its key alone, so what is found is what it would give.  Holds the
-// last motions, no more than twice `most`.  Any number of threads.
-class MotionMemo {
- public:
-  explicit MotionMemo(std::size_t most = 4096) : most_(most) {}
-
-  std::optional<Motion> find(const MotionKey& key) const;
-  void keep(const MotionKey& key, const Motion& motion);
-
- private:
-  struct Hash {
-    std::size_t operator()(const MotionKey& key) const;
-  };
-  using Motions = std::unordered_map<MotionKey, Motion, Hash>;
-
-  std::size_t most_;
-  mutable std::mutex mutex_;
-  Motions young_, old_;
+  // Of what differs among the motions of one log and of the derivatives of its predictions.
+  std::size_t hash() const;
 };
 
 class Vehicle {
@@ -64,7 +44,7 @@ class Vehicle {
 // that need not be simulated again; one that is asked for with its path is.
 std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
                                       const ActiveEffects& effects, StepCounter* steps,
-                                      MotionMemo* memo);
+                                      MotionMemo<MotionKey>* memo);
 // Of the user's program.  One that fails throws ExternalFailure, which no ScenarioModel lets out.
 std::unique_ptr<Vehicle> make_external_vehicle(const Problem& problem,
                                                const ParameterValues& values, StepCounter* steps);
@@ -96,7 +76,7 @@ class Srv1Robot {
   explicit Srv1Robot(const ParameterValues& values, StepCounter* steps = nullptr);
   // Of the problem's scenario: srv1, or external, whose effects are a part of srv1's.
   Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps,
-            MotionMemo* memo = nullptr);
+            MotionMemo<MotionKey>* memo = nullptr);
 
   const ActiveEffects& effects() const { return effects_; }
   const NoiseSettings& noise() const { return noise_; }
