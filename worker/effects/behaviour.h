@@ -28,7 +28,8 @@ struct Situation {
   double session_time_s = 0;
   int last_left = 0;  // sign of each side's last duty in the session; 0: none yet
   int last_right = 0;
-  bool moved = false;  // an unrecorded move came before the trial
+  bool moved = false;     // an unrecorded move came before the trial
+  bool far_away = false;  // from all that lies at a place
 };
 
 // One side's motor on its way from duty to SideDrive.

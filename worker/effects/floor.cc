@@ -27,6 +27,7 @@ enum Patch : std::size_t { kRatio, kPatchX, kPatchY, kRadius };
 
 // Of a first and a second patch each takes the next disc that does nothing yet.
 void lay_patch(EffectValues p, const Situation& situation, Floor& floor) {
+  if (situation.far_away) return;
   const Pose centre_S = between(situation.X_WR, {p[kPatchX], p[kPatchY], 0});
   for (FrictionDisc& disc : floor.patches) {
     if (disc.ratio != 1) continue;

@@ -97,6 +97,28 @@ TEST(Prediction, MotionsThatOnlyTheViewReportsApartAreSimulatedOnce) {
   EXPECT_NE(far.SerializeAsString(), near.SerializeAsString());
 }
 
+// Where no disc of floor is, another disc changes nothing.
+TEST(Prediction, MotionsFarFromAPatchAreSimulatedOnce) {
+  Problem problem = small_problem(60);
+  value(problem, "floor_nap.strength") = 0.2;
+  value(problem, "friction_patch.x") = value(problem, "friction_patch.y") = 8;
+  const auto with_patch = [&](const PreparedProblem* worker, double ratio, StepCounter* steps) {
+    v1::Task task;
+    task.mutable_predict()->set_means_only(true);
+    v1::Override* patch = task.mutable_predict()->mutable_point()->add_overrides();
+    patch->set_parameter(static_cast<std::uint32_t>(srv1_table().row("friction_patch.ratio")));
+    patch->set_value(ratio);
+    return evaluate(worker, task, steps);
+  };
+  const auto worker = prepare(to_proto(problem)), fresh = prepare(to_proto(problem));
+  ASSERT_TRUE(worker.ok() && fresh.ok());
+  StepCounter first = 0, second = 0;
+  EXPECT_EQ(with_patch(worker->get(), 0.5, &first).outcome(), v1::OK);
+  const v1::TaskResult other = with_patch(worker->get(), 0.6, &second);
+  EXPECT_LT(second, first / 4);  // the ways that tell how far the patch is
+  EXPECT_EQ(other.SerializeAsString(), with_patch(fresh->get(), 0.6, nullptr).SerializeAsString());
+}
+
 TEST(MotionMemo, GivesBackWhatItKeptAndKeepsTheLast) {
   MotionMemo<MotionKey> memo(3);
   MotionKey key;

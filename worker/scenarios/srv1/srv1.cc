@@ -250,6 +250,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     Pose X_SE = motion.end(X_WR.theta, trial.context.session_time_s);
     Situation situation = reference_situation(group);
     situation.X_WR = X_WR;
+    situation.far_away = false;
     situation.session_time_s = trial.context.session_time_s;
     if (simulate_alone(robot, group, motion, situation, X_SE, problem_.treads().scale(),
                        options.headings)) {

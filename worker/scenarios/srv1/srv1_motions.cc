@@ -19,7 +19,6 @@ constexpr double kHeadingJump = 1e-2;
 // Motion is nearly linear in the speed that a time-dependent effect changes; where few headings
 // will do, as for derivatives, so will few times.
 constexpr std::size_t kTimes = 4, kFewTimes = 2;
-constexpr double kFarAway = 1e6;  // m
 constexpr double kPathInterval_s = 0.02;
 
 }  // namespace
@@ -30,7 +29,8 @@ bool ConditionGroup::few(std::size_t headings) const {
 
 Situation reference_situation(const ConditionGroup& group) {
   Situation s;
-  s.X_WR = {kFarAway, kFarAway, group.heading_rad};
+  s.X_WR.theta = group.heading_rad;
+  s.far_away = true;
   s.session_time_s = (group.first_time_s + group.last_time_s) / 2;
   s.last_left = group.last_left;
   s.last_right = group.last_right;
