@@ -115,7 +115,7 @@ TEST(Prediction, MotionsFarFromAPatchAreSimulatedOnce) {
   StepCounter first = 0, second = 0;
   EXPECT_EQ(with_patch(worker->get(), 0.5, &first).outcome(), v1::OK);
   const v1::TaskResult other = with_patch(worker->get(), 0.6, &second);
-  EXPECT_LT(second, first / 4);  // the ways that tell how far the patch is
+  EXPECT_LT(second, first / 4);  // the ways that show how far the patch is
   EXPECT_EQ(other.SerializeAsString(), with_patch(fresh->get(), 0.6, nullptr).SerializeAsString());
 }
 
