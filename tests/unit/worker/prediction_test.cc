@@ -71,52 +71,51 @@ TEST(Prediction, SharedConditionsMatchSimulatingEachTrial) {
   EXPECT_LT(worst_sharing_error(floor), 4e-3);
 }
 
+// What is predicted where one value is another.
+v1::TaskResult predicted_with(const PreparedProblem* worker, const char* key, double value,
+                              StepCounter* steps) {
+  v1::Task task;
+  task.mutable_predict()->set_means_only(true);
+  v1::Override* there = task.mutable_predict()->mutable_point()->add_overrides();
+  there->set_parameter(static_cast<std::uint32_t>(srv1_table().row(key)));
+  there->set_value(value);
+  return evaluate(worker, task, steps);
+}
+
 // A motion that was simulated for another view of the camera is not simulated again, and what is
 // predicted is the same to the bit.
 TEST(Prediction, MotionsThatOnlyTheViewReportsApartAreSimulatedOnce) {
+  const char* slope = "camera_seam.slope_x";
   Problem problem = small_problem(12);
   value(problem, "floor_nap.strength") = 0.2;  // every trial by itself
-  const auto seen_from = [&](const PreparedProblem* worker, double slope, StepCounter* steps) {
-    v1::Task task;
-    task.mutable_predict()->set_means_only(true);
-    v1::Override* seam = task.mutable_predict()->mutable_point()->add_overrides();
-    seam->set_parameter(static_cast<std::uint32_t>(srv1_table().row("camera_seam.slope_x")));
-    seam->set_value(slope);
-    return evaluate(worker, task, steps);
-  };
   const auto worker = prepare(to_proto(problem)), fresh = prepare(to_proto(problem));
   ASSERT_TRUE(worker.ok() && fresh.ok());
   StepCounter steps = 0;
-  const v1::TaskResult near = seen_from(worker->get(), 0.01, &steps);
+  const v1::TaskResult near = predicted_with(worker->get(), slope, 0.01, &steps);
   ASSERT_EQ(near.outcome(), v1::OK) << near.message();
   const std::uint64_t simulated = steps;
   EXPECT_GT(simulated, 0u);
-  const v1::TaskResult far = seen_from(worker->get(), 0.05, &steps);
+  const v1::TaskResult far = predicted_with(worker->get(), slope, 0.05, &steps);
   EXPECT_EQ(steps, simulated);
-  EXPECT_EQ(far.SerializeAsString(), seen_from(fresh->get(), 0.05, nullptr).SerializeAsString());
+  EXPECT_EQ(far.SerializeAsString(),
+            predicted_with(fresh->get(), slope, 0.05, nullptr).SerializeAsString());
   EXPECT_NE(far.SerializeAsString(), near.SerializeAsString());
 }
 
 // Where no disc of floor is, another disc changes nothing.
 TEST(Prediction, MotionsFarFromAPatchAreSimulatedOnce) {
+  const char* ratio = "friction_patch.ratio";
   Problem problem = small_problem(60);
   value(problem, "floor_nap.strength") = 0.2;
   value(problem, "friction_patch.x") = value(problem, "friction_patch.y") = 8;
-  const auto with_patch = [&](const PreparedProblem* worker, double ratio, StepCounter* steps) {
-    v1::Task task;
-    task.mutable_predict()->set_means_only(true);
-    v1::Override* patch = task.mutable_predict()->mutable_point()->add_overrides();
-    patch->set_parameter(static_cast<std::uint32_t>(srv1_table().row("friction_patch.ratio")));
-    patch->set_value(ratio);
-    return evaluate(worker, task, steps);
-  };
   const auto worker = prepare(to_proto(problem)), fresh = prepare(to_proto(problem));
   ASSERT_TRUE(worker.ok() && fresh.ok());
   StepCounter first = 0, second = 0;
-  EXPECT_EQ(with_patch(worker->get(), 0.5, &first).outcome(), v1::OK);
-  const v1::TaskResult other = with_patch(worker->get(), 0.6, &second);
+  EXPECT_EQ(predicted_with(worker->get(), ratio, 0.5, &first).outcome(), v1::OK);
+  const v1::TaskResult other = predicted_with(worker->get(), ratio, 0.6, &second);
   EXPECT_LT(second, first / 4);  // the ways that show how far the patch is
-  EXPECT_EQ(other.SerializeAsString(), with_patch(fresh->get(), 0.6, nullptr).SerializeAsString());
+  EXPECT_EQ(other.SerializeAsString(),
+            predicted_with(fresh->get(), ratio, 0.6, nullptr).SerializeAsString());
 }
 
 TEST(MotionMemo, GivesBackWhatItKeptAndKeepsTheLast) {
