@@ -94,6 +94,9 @@ class WindowFitter {
   WindowFitter(const GroundRobot& robot, const WindowSet& windows,
                const std::optional<GroundReference>& reference = kNoReference,
                FitMemo* memo = nullptr);
+  // Not with a reference that would be gone: one that is no optional is made into one on the way.
+  WindowFitter(const GroundRobot&, const WindowSet&, const std::optional<GroundReference>&&,
+               FitMemo* = nullptr) = delete;
 
   // Maximum over windows whose block is not in `left_out` (one flag a block; empty: none).
   // Starts at `values` where that has the size of `rows`, else at the rows' nominals; fewer rounds
