@@ -126,18 +126,20 @@ bool commanded_alike(const CommandedRun& a, const CommandedRun& b) {
   return std::ranges::equal(a.commands, b.commands, {}, &CommandRow::values, &CommandRow::values);
 }
 
-// Of each of these runs, where it is among what is held out: counted from 0 on, repeats alike.
+// Of each of these runs, where it is among what is held out: counted from 0 on, repeats alike; and
+// how many places there are.
 std::map<std::size_t, std::size_t> places_of(const std::map<std::size_t, std::array<double, 2>>& of,
                                              std::span<const CommandedRun> runs, bool repeats,
                                              std::size_t* different) {
   std::map<std::size_t, std::size_t> places;
-  std::size_t& count = *different = 0;
+  std::size_t count = 0;
   for (const auto& [run, span] : of) {
     const auto like = std::ranges::find_if(places, [&](const auto& known) {
       return repeats && commanded_alike(runs[known.first], runs[run]);
     });
     places[run] = like == places.end() ? count++ : like->second;
   }
+  *different = count;
   return places;
 }
 

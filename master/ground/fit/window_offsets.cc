@@ -99,9 +99,10 @@ Eigen::Vector3d exposure(const TwistReader& reader, const CommandedRun& run, dou
     const double end_s = k + 1 < run.commands.size() ? run.commands[k + 1].t_s : to_s;
     const double held_s = std::min(end_s, to_s) - std::max(run.commands[k].t_s, from_s);
     const Eigen::Vector2d twist = reader.read(run.commands[k].values);
-    if (twist[1] == 0 || held_s <= 0) continue;
-    const double way = held_s * twist[0];
-    sums += Eigen::Vector3d(way, std::copysign(way, way * twist[1]), held_s * std::abs(twist[1]));
+    const double ahead_m_s = twist[0], rim_m_s = twist[1];
+    if (rim_m_s == 0 || held_s <= 0) continue;
+    const double way = held_s * ahead_m_s;
+    sums += Eigen::Vector3d(way, std::copysign(way, way * rim_m_s), held_s * std::abs(rim_m_s));
   }
   return sums;
 }

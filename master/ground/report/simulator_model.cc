@@ -7,6 +7,7 @@
 #include <cctype>
 
 #include "common/base/ranges.h"
+
 namespace gapfarm {
 namespace {
 
