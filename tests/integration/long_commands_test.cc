@@ -73,7 +73,7 @@ TEST_F(LongCommands, ComparisonsGoOn) {
 }
 
 TEST_F(LongCommands, CrossfitsGoOnWithoutAFolder) {
-  const std::vector<std::string> arguments = {"crossfit",  slow_, "--evaluations", "150",
+  const std::vector<std::string> arguments = {"crossfit",  slow_, "--evaluations", "600",
                                               "--workers", "1",   "--train",       "session=s1"};
   RunningProgram first("gapfarm", arguments, environment_);
   const auto kept = [&] {
@@ -100,7 +100,7 @@ TEST_F(LongCommands, CrossfitsGoOnWithoutAFolder) {
 TEST_F(LongCommands, SimulationsGoOnBesideTheirFile) {
   const auto arguments = [&](const std::string& out) {
     return std::vector<std::string>{"simulate", slow_,      "--out", folder_ / out, "--sessions",
-                                    "40",       "--trials", "150",   "--workers",   "1"};
+                                    "120",      "--trials", "150",   "--workers",   "1"};
   };
   stop_and_go_on(arguments("sim.csv"), folder_ / "sim.csv.partial");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "sim.csv.partial"));
@@ -109,10 +109,14 @@ TEST_F(LongCommands, SimulationsGoOnBesideTheirFile) {
 }
 
 TEST_F(LongCommands, DeterminingGoesOn) {
+  // A determination scores little, and a command reports how far it is once a second.
+  std::string text = demo_config(10, 6, kMoreGenes);
+  text.insert(text.find("step_rate"), "sub_steps = 4\n");
+  const std::string slower = folder_.write("slower.toml", text);
   ASSERT_EQ(
-      gapfarm_command({"evolve", slow_, "--out", folder_ / "run", "--generations", "2"}).exit_code,
+      gapfarm_command({"evolve", slower, "--out", folder_ / "run", "--generations", "2"}).exit_code,
       0);
-  stop_and_go_on({"determine", slow_, "--model", folder_ / "run", "--out", folder_ / "d.csv",
+  stop_and_go_on({"determine", slower, "--model", folder_ / "run", "--out", folder_ / "d.csv",
                   "--workers", "1"},
                  folder_ / "d.csv.partial");
 }
