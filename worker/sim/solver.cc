@@ -51,62 +51,41 @@ bool is_driven(btAlignedObjectArray<btSolverBody>& bodies, const btSolverConstra
   return false;
 }
 
-// The impulses (p1, p2) that minimise a1 (p1 - free1)^2 + a2 (p2 - free2)^2, where a is the inverse
-// effective mass along a row, within p1^2 + (p2 / ratio)^2 <= radius^2.  Outside the ellipse the
-// multiplier solves a secular equation; two steps of Newton on 1/|u| (More and Sorensen 1983) are
-// exact for a1 = ratio^2 a2 and good to a fraction of a percent otherwise, and the last line puts
-// the result onto the ellipse whatever the multiplier's error.
-void project_onto_ellipse(double a1, double a2, double ratio, double radius, double& p1,
-                          double& p2) {
-  double u1 = p1;
-  double u2 = p2 / ratio;
-  double length_2 = u1 * u1 + u2 * u2;
-  if (length_2 <= radius * radius) return;
-  if (radius <= 0) {
-    p1 = p2 = 0;
-    return;
-  }
-  const double h1 = a1;
-  const double h2 = a2 * ratio * ratio;
-  const double g1 = h1 * u1;
-  const double g2 = h2 * u2;
-  double multiplier = 0;
-  for (int i = 0; i < 2; ++i) {
-    const double slope = u1 * u1 / (h1 + multiplier) + u2 * u2 / (h2 + multiplier);
-    multiplier += length_2 / slope * (std::sqrt(length_2) / radius - 1);
-    u1 = g1 / (h1 + multiplier);
-    u2 = g2 / (h2 + multiplier);
-    length_2 = u1 * u1 + u2 * u2;
-  }
-  const double scale = radius / std::sqrt(length_2);
-  p1 = u1 * scale;
-  p2 = u2 * scale * ratio;
-}
-
 // Where a row of friction, which has no depth to repair, keeps the multiplier of its last sweep.
 double& multiplier_of(btSolverConstraint& row) { return row.m_rhsPenetration; }
 
-// Of a sum that is to be 1.  Newton's step from there leaves an error of about its square.
-constexpr double kSolved = 1e-5;
-constexpr int kMostNewtonSteps = 8;  // two or three do but where a contact begins to slide
+// Of a sum that is to be 1.  Newton's step from there leaves an error of about its square, and the
+// next sweep goes on from where it left.
+constexpr double kSolved = 1e-3;
+constexpr int kMostNewtonSteps = 8;  // one or two do but where a contact begins to slide
 
-// The impulses of a surface that creeps: with u = (p1, p2 / ratio) / radius, the velocity that is
-// left along a row is -slip u / sqrt(1 - |u|^2) (times 1 / ratio across), so that friction grows
-// with the sliding speed and reaches the ellipse where that is large beside `slip` (m/s).  As above
-// u is a function of one multiplier, for which a secular equation is solved the same way, from
-// where the last sweep of this step left `multiplier`; 0: from bounds.  From below the root steps
-// stay below it, and from above one leads below (1/|u| is concave).
-void creep_within_ellipse(double a1, double a2, double ratio, double radius, double slip,
-                          double& multiplier, double& p1, double& p2) {
+// The impulses of friction, from those, (p1, p2), that would stop all sliding; a is the inverse
+// effective mass along a row.  Without `slip` those that minimise a1 (p1 - free1)^2 + a2 (p2 -
+// free2)^2 within p1^2 + (p2 / ratio)^2 <= radius^2.  A surface that creeps leaves, with u = (p1,
+// p2 / ratio) / radius, a velocity of -slip u / sqrt(1 - |u|^2) along a row (times 1 / ratio
+// across), so that friction grows with the sliding speed and reaches the ellipse where that is
+// large beside `slip` (m/s).  Either way u is a function of one multiplier, for which a secular
+// equation is solved by Newton's steps on 1/|u| (More and Sorensen 1983), from where the last sweep
+// of this step left `multiplier`; 0: from bounds.  From below the root steps stay below it, and
+// from above one leads below (1/|u| is concave).  The last lines put the result onto the ellipse
+// whatever the multiplier's error.
+void limit_to_ellipse(double a1, double a2, double ratio, double radius, double slip,
+                      double& multiplier, double& p1, double& p2) {
   if (radius <= 0) {
     p1 = p2 = 0;
     return;
   }
+  const double inverse = 1 / radius;
+  const double w1 = p1 * inverse;
+  const double w2 = p2 * inverse / ratio;
+  if (slip <= 0 && w1 * w1 + w2 * w2 <= 1) {
+    multiplier = 0;
+    return;
+  }
   const double h1 = a1;
   const double h2 = a2 * ratio * ratio;
-  const double inverse = 1 / radius;
-  const double g1 = h1 * p1 * inverse;
-  const double g2 = a2 * ratio * p2 * inverse;
+  const double g1 = h1 * w1;
+  const double g2 = h2 * w2;
   const double least = slip * inverse;
   if (multiplier == 0) multiplier = std::sqrt(g1 * g1 + g2 * g2) - std::max(h1, h2);
   for (int i = 0; i < kMostNewtonSteps; ++i) {
@@ -114,7 +93,7 @@ void creep_within_ellipse(double a1, double a2, double ratio, double radius, dou
     // Reciprocals, because this is where a worker spends a quarter of its time.
     const double i1 = 1 / (h1 + multiplier);
     const double i2 = 1 / (h2 + multiplier);
-    const double i0 = 1 / multiplier;
+    const double i0 = least > 0 ? 1 / multiplier : 0;
     const double s1 = g1 * i1 * g1 * i1;
     const double s2 = g2 * i2 * g2 * i2;
     const double s0 = least * i0 * least * i0;
@@ -125,7 +104,7 @@ void creep_within_ellipse(double a1, double a2, double ratio, double radius, dou
   const double u1 = g1 / (h1 + multiplier);
   const double u2 = g2 / (h2 + multiplier);
   const double length_2 = u1 * u1 + u2 * u2;
-  const double onto = length_2 > 1 ? radius / std::sqrt(length_2) : radius;
+  const double onto = slip <= 0 || length_2 > 1 ? radius / std::sqrt(length_2) : radius;
   p1 = u1 * onto;
   p2 = u2 * onto * ratio;
 }
@@ -225,18 +204,13 @@ double EllipseFrictionSolver::solve_friction() {
     const double a2 = 1 / rows[1].m_jacDiagABInv;
     const double ratio = rows[1].m_friction;
     const double radius = rows[0].m_friction * normal.m_appliedImpulse;
-    if (ratio < 0 && rows[0].m_cfm > 0) {
+    const double slip = rows[0].m_cfm;
+    if (ratio < 0) {
       double none = 0;
-      const double slip = rows[0].m_cfm;
-      creep_within_ellipse(a1, a1, 1, radius, slip, multiplier_of(rows[0]), p1, none);
-      creep_within_ellipse(a2, a2, 1, -ratio * radius, slip, multiplier_of(rows[1]), p2, none);
-    } else if (ratio < 0) {
-      p1 = std::clamp(p1, -radius, radius);
-      p2 = std::clamp(p2, ratio * radius, -ratio * radius);
-    } else if (rows[0].m_cfm > 0) {
-      creep_within_ellipse(a1, a2, ratio, radius, rows[0].m_cfm, multiplier_of(rows[0]), p1, p2);
+      limit_to_ellipse(a1, a1, 1, radius, slip, multiplier_of(rows[0]), p1, none);
+      limit_to_ellipse(a2, a2, 1, -ratio * radius, slip, multiplier_of(rows[1]), p2, none);
     } else {
-      project_onto_ellipse(a1, a2, ratio, radius, p1, p2);
+      limit_to_ellipse(a1, a2, ratio, radius, slip, multiplier_of(rows[0]), p1, p2);
     }
     rows[0].m_appliedImpulse = p1;
     rows[1].m_appliedImpulse = p2;
