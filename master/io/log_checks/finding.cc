@@ -25,7 +25,8 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"duplicates", "trials are repeated"},
       {"clock_backward", "time runs backward"},
       {"frames_apart", "finger and pieces are not in one frame"},
-      {"impossible_rows", "some rows cannot be"}};
+      {"impossible_rows", "some rows cannot be"},
+      {"false_readings", "some readings are false"}};
   const auto found = phrases.find(finding.name);
   if (found != phrases.end()) return found->second;
   std::string words = finding.name;

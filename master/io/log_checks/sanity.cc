@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string>
 #include <utility>
 
 #include "common/base/ranges.h"
 #include "master/io/log_checks/drive_checks.h"
+#include "master/io/log_checks/false_readings.h"
 #include "master/io/log_checks/log_checks.h"
 #include "master/io/log_checks/push_checks.h"
 
@@ -32,16 +34,29 @@ DriveLimits limits_of(const Problem& problem) {
           problem.values[row_of(Srv1::kTrackGauge)]};
 }
 
-void note_impossible(const Problem& problem, std::vector<SanityFinding>* findings) {
-  const std::vector<std::size_t> rows = impossible_trials(problem);
+// Trials that would have to be too fast.
+std::vector<std::size_t> too_fast_trials(const Problem& problem) {
+  const std::vector<DriveSample> samples = drive_samples(problem);
+  const double speed = full_speed_of(samples);
+  std::vector<std::size_t> rows;
+  if (speed <= 0) return rows;
+  for (const DriveSample& s : samples) {
+    if (s.distance_m() > kTimesAsFar * speed * s.most_s + kBeyond_m) rows.push_back(s.trial);
+  }
+  const auto all = static_cast<double>(samples.size());
+  if (static_cast<double>(rows.size()) > kMostImpossible * all) rows.clear();
+  return rows;
+}
+
+void note_rows(const Problem& problem, const std::vector<std::size_t>& rows, const char* name,
+               const std::string& what, std::vector<SanityFinding>* findings) {
   if (rows.empty()) return;
   const Trial& first = problem.log.trials[rows.front()];
-  findings->push_back({"impossible_rows",
+  findings->push_back({name,
                        std::to_string(rows.size()) + " of " +
-                           std::to_string(problem.log.trials.size()) +
-                           " trials end farther from their start than twice the log's own speed "
-                           "leads (the first: session " +
-                           first.session + ", trial " + std::to_string(first.trial) + ").",
+                           std::to_string(problem.log.trials.size()) + " trials " + what +
+                           " (the first: session " + first.session + ", trial " +
+                           std::to_string(first.trial) + ").",
                        "Look at these rows; a diagnosis leaves them out.", Severity::kNote});
 }
 
@@ -80,22 +95,24 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
   }
   if (suspicious) return;
   check_turning(samples, limits, findings);
-  note_impossible(problem, findings);
+  const std::vector<std::size_t> fast = too_fast_trials(problem), wrong = false_readings(problem);
+  std::vector<std::size_t> others;
+  std::ranges::set_difference(wrong, fast, std::back_inserter(others));
+  note_rows(problem, fast, "impossible_rows",
+            "end farther from their start than twice the log's own speed leads", findings);
+  note_rows(problem, others, "false_readings",
+            "end where no other of their command does, and the reading before or after contradicts "
+            "theirs, others repeat it to the last digit, or nothing else is as far off",
+            findings);
 }
 
 }  // namespace
 
 std::vector<std::size_t> impossible_trials(const Problem& problem) {
   if (!has_drives(problem)) return {};
-  const std::vector<DriveSample> samples = drive_samples(problem);
-  const double speed = full_speed_of(samples);
+  const std::vector<std::size_t> fast = too_fast_trials(problem), wrong = false_readings(problem);
   std::vector<std::size_t> rows;
-  if (speed <= 0) return rows;
-  for (const DriveSample& s : samples) {
-    if (s.distance_m() > kTimesAsFar * speed * s.most_s + kBeyond_m) rows.push_back(s.trial);
-  }
-  const auto all = static_cast<double>(samples.size());
-  if (static_cast<double>(rows.size()) > kMostImpossible * all) rows.clear();
+  std::ranges::set_union(fast, wrong, std::back_inserter(rows));
   return rows;
 }
 

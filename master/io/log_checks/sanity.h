@@ -18,8 +18,8 @@ inline constexpr std::size_t kFewestTrials = 40;
 std::vector<SanityFinding> check_sanity(const Problem& problem);
 
 // Trials of a log of drives that cannot be: the robot would have had to move at more than twice the
-// log's own speed and 30 cm beyond.  Ascending; empty where they are so many that the speed itself
-// is in question.
+// log's own speed and 30 cm beyond (none where they are so many that the speed itself is in
+// question), or other readings contradict theirs (false_readings()).  Ascending.
 std::vector<std::size_t> impossible_trials(const Problem& problem);
 
 }  // namespace gapfarm

@@ -1,0 +1,203 @@
+#include "master/io/log_checks/false_readings.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <optional>
+
+#include "common/math/statistics.h"
+#include "common/score/motion_model.h"
+#include "common/trials/context.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kMostFalse = 0.25;  // of the trials
+constexpr std::size_t kFewestRepeats = 3;
+constexpr std::size_t kFewestSamePose = 3;
+constexpr std::size_t kFewestProven = 3;     // for those that nothing confirms to be of their kind
+constexpr double kDeviations = 8;            // beyond what moves leave unsure: no noise is that far
+constexpr double kMostSpread = 3;            // over the median command's
+constexpr double kMedianOfNormal = 1.4826;   // a standard deviation over its median deviation
+constexpr std::size_t kOfWhichByChance = 4;  // false readings, one on the way
+constexpr std::size_t kOfWhichAlone = 200;   // trials, one that is like no other
+constexpr double kTimesTheOthers = 4;        // as any other: no effect of few trials
+constexpr int kStepsOfWay = 20;
+constexpr double kMostKnownTurn_rad = 2.5;  // beyond it the way round may have been the other
+
+// Where drives of one command end, seen from their starts.
+struct Cell {
+  Pose end;
+  double reach_m = 0, reach_rad = 0;  // ends beyond are none of these
+
+  // How far from there, over how far these reach.
+  double distance(const Pose& X_SE, const Pose& from, bool any_heading = false) const {
+    const double moved = std::hypot(X_SE.x - from.x, X_SE.y - from.y) / reach_m;
+    const double turned = std::abs(wrap_angle(X_SE.theta - from.theta)) / reach_rad;
+    return any_heading ? moved : std::max(moved, turned);
+  }
+  bool holds(const Pose& X_SE) const { return distance(X_SE, end) <= 1; }
+  bool holds_on_the_way(const Pose& X_SE) const {
+    const Twist way = log(end);
+    const bool any_heading = std::abs(end.theta) > kMostKnownTurn_rad;
+    for (int k = 0; k <= kStepsOfWay; ++k) {
+      if (distance(X_SE, exp(way * k / kStepsOfWay), any_heading) <= 1) return true;
+    }
+    return false;
+  }
+};
+
+double spread(std::vector<double> values, double middle) {
+  for (double& v : values) v = std::abs(v - middle);
+  return kMedianOfNormal * median(values);
+}
+
+// Their reach is their spread as yet.
+std::optional<Cell> cell_of(const std::vector<Pose>& ends) {
+  if (ends.size() < kFewestRepeats) return std::nullopt;
+  std::vector<double> x, y, theta;
+  for (const Pose& E : ends) {
+    x.push_back(E.x);
+    y.push_back(E.y);
+    theta.push_back(E.theta);
+  }
+  Cell cell{{median(x), median(y), circular_centre(theta)}};
+  for (double& t : theta) t = wrap_angle(t - cell.end.theta);
+  cell.reach_m = std::max(spread(x, cell.end.x), spread(y, cell.end.y));
+  cell.reach_rad = spread(theta, 0);
+  return cell;
+}
+
+using Command = std::array<double, 3>;  // left, right, duration
+using Cells = std::map<Command, std::optional<Cell>>;
+
+// Of few drives a false one or two make the spread.
+void reach_beyond_noise(const MoveTolerance& unsure, Cells* cells) {
+  const auto reach = [&](double Cell::*of, double least) {
+    std::vector<double> all;
+    for (const auto& [command, cell] : *cells) {
+      if (cell) all.push_back((*cell).*of);
+    }
+    if (all.empty()) return;
+    const double most = kMostSpread * median(all);
+    for (auto& [command, cell] : *cells) {
+      if (cell) (*cell).*of = least + kDeviations * std::min((*cell).*of, most);
+    }
+  };
+  reach(&Cell::reach_m, unsure.distance_m);
+  reach(&Cell::reach_rad, unsure.heading_rad);
+}
+
+// What other readings make of one.
+enum class Reading { kFine, kLate, kUnconfirmed, kContradicted };
+
+class Drives {
+ public:
+  explicit Drives(const Problem& problem) : trials_(problem.log.trials) {
+    const MoveTolerance unsure = estimate_move_tolerance(problem.log);
+    std::vector<DrivenCommand> driven;
+    std::map<Command, std::vector<Pose>> ends;
+    for (const Trial& t : trials_) {
+      const CommandSpec c = resolved_command(t, problem.commands);
+      driven.push_back({c.left, c.right, c.duration_s});
+      commands_.push_back({c.left, c.right, c.duration_s});
+      ends[commands_.back()].push_back(between(t.X_WS, t.X_WE));
+      ++same_end_[key(t.X_WE)];
+    }
+    for (const auto& [command, poses] : ends) cells_[command] = cell_of(poses);
+    reach_beyond_noise(unsure, &cells_);
+    const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+    next_.resize(trials_.size());
+    moved_.resize(trials_.size());
+    for (std::size_t i = 0; i < contexts.size(); ++i) {
+      previous_.push_back(contexts[i].previous);
+      moved_[i] = contexts[i].moved;
+      if (contexts[i].previous) next_[*contexts[i].previous] = i;
+    }
+  }
+
+  Reading end_of(std::size_t i) const {
+    const Trial& t = trials_[i];
+    const auto& cell = cells_.at(commands_[i]);
+    const Pose X_SE = between(t.X_WS, t.X_WE);
+    if (!cell || cell->holds(X_SE)) return Reading::kFine;
+    if (same_end_.at(key(t.X_WE)) >= kFewestSamePose) return Reading::kContradicted;
+    if (next_[i] && !moved_[*next_[i]]) return Reading::kFine;
+    if (t.X_WS != t.X_WE && cell->holds_on_the_way(X_SE)) return Reading::kLate;
+    if (!next_[i]) return Reading::kUnconfirmed;
+    return cell->holds(between(t.X_WS, trials_[*next_[i]].X_WS)) ? Reading::kContradicted
+                                                                 : Reading::kUnconfirmed;
+  }
+
+  // How far it ends from where drives of its command do, over how far these reach; 0: nobody knows.
+  double distance(std::size_t i) const {
+    const auto& cell = cells_.at(commands_[i]);
+    return cell ? cell->distance(between(trials_[i].X_WS, trials_[i].X_WE), cell->end) : 0;
+  }
+
+  bool has_false_start(std::size_t i) const {
+    const Trial& t = trials_[i];
+    const auto& cell = cells_.at(commands_[i]);
+    if (!cell || !previous_[i] || !moved_[i]) return false;
+    return !cell->holds(between(t.X_WS, t.X_WE)) &&
+           cell->holds(between(trials_[*previous_[i]].X_WE, t.X_WE));
+  }
+
+ private:
+  using Key = std::array<double, 3>;
+  static Key key(const Pose& X) { return {X.x, X.y, X.theta}; }
+
+  const std::vector<Trial>& trials_;
+  std::vector<Command> commands_;
+  Cells cells_;
+  std::map<Key, std::size_t> same_end_;
+  std::vector<std::optional<std::size_t>> previous_, next_;  // in the session
+  std::vector<bool> moved_;  // where it begins is not where the one before ends
+};
+
+// Beyond this distance trials are like no other: few, and far away from the next.
+double farthest_of_others(std::vector<double> distances) {
+  std::ranges::sort(distances, std::greater<>());
+  const std::size_t most = std::max<std::size_t>(1, distances.size() / kOfWhichAlone);
+  double limit = INFINITY;
+  for (std::size_t k = 0; k < most && k + 1 < distances.size(); ++k) {
+    const double others = std::max(1.0, distances[k + 1]);
+    if (distances[k] > kTimesTheOthers * others) limit = others;
+  }
+  return limit;
+}
+
+}  // namespace
+
+std::vector<std::size_t> false_readings(const Problem& problem) {
+  const Drives drives(problem);
+  std::vector<std::size_t> rows;
+  std::map<Reading, std::size_t> count;
+  std::vector<Reading> readings;
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
+    readings.push_back(drives.has_false_start(i) ? Reading::kContradicted : drives.end_of(i));
+    ++count[readings.back()];
+    const bool known =
+        readings.back() != Reading::kFine && readings.back() != Reading::kUnconfirmed;
+    distances.push_back(known ? 0 : drives.distance(i));
+  }
+  const bool proven = count[Reading::kContradicted] >= kFewestProven;
+  const std::size_t off_the_way = count[Reading::kContradicted] + count[Reading::kUnconfirmed];
+  const bool by_chance = count[Reading::kLate] * kOfWhichByChance <= off_the_way;
+  const double limit = farthest_of_others(distances);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const Reading of = readings[i];
+    if (distances[i] > limit || of == Reading::kContradicted ||
+        (proven && of == Reading::kUnconfirmed) || (proven && by_chance && of == Reading::kLate)) {
+      rows.push_back(i);
+    }
+  }
+  const auto all = static_cast<double>(problem.log.trials.size());
+  if (static_cast<double>(rows.size()) > kMostFalse * all) rows.clear();
+  return rows;
+}
+
+}  // namespace gapfarm
