@@ -251,11 +251,16 @@ Status RunStore::insert_individuals(const StoredGeneration& generation) {
 }
 
 Status RunStore::set_numeric_class(const std::string& numeric_class) {
-  if (!info_.numeric_class.empty()) return {};
+  const BuildInfo& build = build_info();
+  const bool own = info_.fingerprint == build.fingerprint;
+  if (own && !info_.numeric_class.empty()) return {};
   RETURN_IF_ERROR(database_.run("keep the numeric class",
-                                "UPDATE run SET numeric_class = ? WHERE numeric_class = ''",
-                                numeric_class));
+                                "UPDATE run SET numeric_class = ?, fingerprint = ?, "
+                                "program_version = ?",
+                                numeric_class, build.fingerprint, build.version));
   info_.numeric_class = numeric_class;
+  info_.fingerprint = build.fingerprint;
+  info_.program_version = build.version;
   return {};
 }
 

@@ -40,7 +40,8 @@ class RunStore {
   const std::filesystem::path& run() const { return run_; }
   std::uint64_t epoch() const { return epoch_; }
 
-  // The numeric class that the first worker brought.  Once set it stays.
+  // The numeric class that the first worker brought.  Once set it stays, until another build goes
+  // on with the run, whose numbers are its own: then the run is of that build.
   Status set_numeric_class(const std::string& numeric_class);
 
   // Commits a generation with all its individuals and the state after it in one transaction, on

@@ -17,6 +17,7 @@ namespace gapfarm::run_folder_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr int kRefused = 2;
 constexpr int kNoMounts = 99;
@@ -205,8 +206,12 @@ TEST_F(RunFolder, OfVersion01IsReadAsItIsAndUpgradedByResume) {
 
   const Finished resumed = resume(run_, "4");
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("another build made this run (gapfarm 0.1"));
   EXPECT_EQ(schema(), kRunStoreSchema);
   EXPECT_EQ(status_of(run_)["generation"], 4);
+  const Finished again = resume(run_, "5");
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.err, Not(HasSubstr("another build"))) << "it is of this one now";
   const auto database = Database::open(file_, Database::Mode::kQueryOnly);
   auto kept = database->prepare("SELECT digest FROM generations WHERE generation = 2", "test");
   ASSERT_TRUE(*kept->step());

@@ -54,7 +54,14 @@ Result<std::unique_ptr<Farm>> open_farm(const RunStore& store, const Config& con
                                         CliContext& context) {
   SocketFarmOptions base;
   base.epoch = store.epoch();
-  base.admittance.numeric_class = store.info().numeric_class;
+  const RunInfo& run = store.info();
+  if (run.fingerprint == build_info().fingerprint) {
+    base.admittance.numeric_class = run.numeric_class;
+  } else {
+    context.console.note("another build made this run (gapfarm " + run.program_version +
+                         ", build " + run.fingerprint +
+                         "): from here on its numbers are this build's");
+  }
   base.shuffle_seed = options.shuffle;
   report_to(log, base);
   base.on_event = [keep, next = base.on_event](const FarmEvent& event) {
