@@ -42,7 +42,7 @@ TEST(Outliers, AFewStartsThatWereFarOffAreNamed) {
   Problem problem = chained_log(360);
   for (const auto& [i, turn] : {std::pair{60, 1.2}, {150, -1.0}, {300, 0.9}}) {
     Trial& t = problem.log.trials[static_cast<std::size_t>(i)];
-    t.X_WE = t.X_WS * Pose{0, 0, turn} * between(t.X_WS, t.X_WE);
+    t.X_WS = t.X_WS * Pose{0, 0, -turn};
   }
   KinematicFarm farm;
   const auto result = diagnose(farm, problem, {});
