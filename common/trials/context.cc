@@ -77,7 +77,7 @@ int sign(double duty) { return duty > 0 ? 1 : duty < 0 ? -1 : 0; }
 
 MoveTolerance estimate_move_tolerance(const TrialLog& log) {
   // Rounded twice, one resting pose may lie a step apart along either axis.
-  const double rounding_m = kStepsApart * pose_grid(log.trials).step_m;
+  const PoseGrid grid = pose_grid(log.trials);
   const auto before = predecessors(log);
   std::vector<double> distances, headings;
   for (std::size_t i = 0; i < before.size(); ++i) {
@@ -86,9 +86,12 @@ MoveTolerance estimate_move_tolerance(const TrialLog& log) {
     distances.push_back(found.distance_m);
     headings.push_back(found.heading_rad);
   }
-  return {std::max(rounding_m, tolerance(std::move(distances), kRayleigh, kLeast.distance_m,
-                                         kGreatest.distance_m)),
-          tolerance(std::move(headings), kFoldedNormal, kLeast.heading_rad, kGreatest.heading_rad)};
+  const double apart_m =
+      tolerance(std::move(distances), kRayleigh, kLeast.distance_m, kGreatest.distance_m);
+  const double apart_rad =
+      tolerance(std::move(headings), kFoldedNormal, kLeast.heading_rad, kGreatest.heading_rad);
+  return {std::max(kStepsApart * grid.step_m, apart_m),
+          std::max(kStepsApart * grid.heading_step_rad, apart_rad)};
 }
 
 std::vector<TrialContext> trial_contexts(const TrialLog& log,

@@ -13,12 +13,12 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kLeastStep_m = 2e-4;
+constexpr double kLeastStep = 2e-4;  // m, rad
 // Fewer distinct values lie on some grid by chance: of values anywhere 6 % lie within kOffGrid of a
 // given one, so that seven do in one case of a million.
 constexpr std::size_t kLeastDistinct = 7;
-constexpr double kOffGrid = 0.03;     // of the step
-constexpr double kDigits_m = 1.2e-5;  // a log prints 1e-5 m: half of that at each of two ends
+constexpr double kOffGrid = 0.03;   // of the step
+constexpr double kDigits = 1.2e-5;  // a log prints 1e-5 m or rad: half of that at each of two ends
 // Of the readings, and of their distinct values: few outliers may be many among those of a coarse
 // grid.
 constexpr double kLeastOnGrid = 0.95;
@@ -42,7 +42,7 @@ std::vector<double> likely_steps(const std::vector<double>& values) {
   std::map<long, int> counts;
   for (std::size_t i = 1; i < values.size(); ++i) {
     const double d = values[i] - values[i - 1];
-    if (d > 0.75 * kLeastStep_m) ++counts[std::lround(d * 1e5)];
+    if (d > 0.75 * kLeastStep) ++counts[std::lround(d * 1e5)];
   }
   std::vector<std::pair<int, long>> common;
   for (const auto& [d, count] : counts) common.push_back({-count, d});
@@ -99,8 +99,8 @@ double grid_of(const std::vector<double>& readings, const std::vector<double>& v
   double widest = 0;
   for (double likely : likely_steps(values)) {
     const double step = refined(likely, differences, values.back() - values.front());
-    if (step <= kLeastStep_m * (1 + 1e-6) || step <= widest) continue;
-    const double tolerance = std::max(kDigits_m, kOffGrid * step);
+    if (step <= kLeastStep * (1 + 1e-6) || step <= widest) continue;
+    const double tolerance = std::max(kDigits, kOffGrid * step);
     if (share_on_grid(values, step, tolerance) < kLeastDistinctOnGrid) continue;
     if (share_on_grid(readings, step, tolerance) >= kLeastOnGrid) widest = step;
   }
@@ -123,9 +123,7 @@ void for_stretches(std::span<const Pose> track, double grid_m, Each each) {
   }
 }
 
-}  // namespace
-
-PoseGrid pose_grid(std::span<const Pose> poses) {
+PoseGrid position_grid(std::span<const Pose> poses) {
   std::vector<double> x, y;
   for (const Pose& X : poses) {
     x.push_back(X.x);
@@ -139,15 +137,30 @@ PoseGrid pose_grid(std::span<const Pose> poses) {
     const double own = grid_of(*axis, values);
     if (own <= 0) return {};
     // Anywhere, a value lies this near to a line of the grid with that chance; what repeats is one.
-    const double near = std::min(0.5, std::max(kDigits_m, kOffGrid * own) / own) * 2;
+    const double near = std::min(0.5, std::max(kDigits, kOffGrid * own) / own) * 2;
     grid.nats -= kLeastDistinctOnGrid * static_cast<double>(values.size()) * std::log(near);
     span = std::max(span, values.back() - values.front());
     grid.step_m = grid.step_m > 0 ? std::min(grid.step_m, own) : own;
   }
   if (grid.step_m <= 0) return {};
-  const double unsure = kDigits_m * grid.step_m / std::max(span, grid.step_m);
+  const double unsure = kDigits * grid.step_m / std::max(span, grid.step_m);
   grid.lo_m = grid.step_m - unsure;
   grid.hi_m = grid.step_m + unsure;
+  return grid;
+}
+
+double heading_step(std::span<const Pose> poses) {
+  std::vector<double> headings;
+  for (const Pose& X : poses) headings.push_back(X.theta);
+  const std::vector<double> values = distinct(headings);
+  return values.size() < kLeastDistinct ? 0 : grid_of(headings, values);
+}
+
+}  // namespace
+
+PoseGrid pose_grid(std::span<const Pose> poses) {
+  PoseGrid grid = position_grid(poses);
+  grid.heading_step_rad = heading_step(poses);
   return grid;
 }
 

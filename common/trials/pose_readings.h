@@ -10,16 +10,17 @@
 
 namespace gapfarm {
 
-// The grid that positions lie on; a step of 0 says that they lie on none.
+// The grids that positions and headings lie on; a step of 0 says that they lie on none.
 struct PoseGrid {
+  double heading_step_rad = 0;
   double step_m = 0;
   double lo_m = 0, hi_m = 0;  // as exactly as the log's digits and span give it
-  double nats = 0;            // by which the readings are more likely on the grid than anywhere
+  double nats = 0;            // by which positions are more likely on the grid than anywhere
 };
 
-// Steps below 0.2 mm are the digits of the file, not a property of the tracker.  The grid may begin
-// anywhere, one reading of twenty may lie off it, and both axes must show one; an axis with fewer
-// than seven distinct positions has no say.
+// Steps below 0.2 mm or mrad are the digits of the file, not a property of the tracker.  The grid
+// may begin anywhere, one reading of twenty may lie off it, and both axes of positions must show
+// one; what has fewer than seven distinct values has no say.
 PoseGrid pose_grid(std::span<const Pose> poses);
 
 // The same of both poses of every trial.

@@ -182,7 +182,7 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes) {
   study.sessions = sessions.size();
   study.gaps = reading_gaps(problem.log, contexts);
   study.grid = pose_grid(problem.log.trials);
-  study.noise.pose = reading_noise(study.gaps, study.grid.step_m);
+  study.noise.pose = reading_noise(study.gaps, study.grid);
   // Logs whose trials share one reading say nothing of it.
   study.reading_noise_known = study.noise.pose.position_m > 0 && study.noise.pose.heading_rad > 0;
   if (study.noise.pose.position_m <= 0) {
@@ -190,7 +190,8 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes) {
                                            study.grid.step_m / std::sqrt(12.0));
   }
   if (study.noise.pose.heading_rad <= 0) {
-    study.noise.pose.heading_rad = problem.values[study.subject->pose_heading.row];
+    study.noise.pose.heading_rad = std::max(problem.values[study.subject->pose_heading.row],
+                                            study.grid.heading_step_rad / std::sqrt(12.0));
   }
   study.noise.drive_common = kFirstCommon;
   study.noise.drive_side = kFirstSide;

@@ -9,7 +9,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kFarGap_m = 0.05;  // farther is no rounding
+constexpr double kFarGap_m = 0.05, kFarGap_rad = 0.35;  // farther is no rounding
 // A Gaussian has 3; the sampling error with 450 gaps is 0.16 for the positions (two a gap) and 0.23
 // for the headings, and these are four of them.
 constexpr double kHeavyPosition = 3.6;
@@ -29,6 +29,14 @@ double spread(const std::vector<double>& values, double heaviest_kurtosis) {
   std::vector<double> absolute;
   for (double v : values) absolute.push_back(std::abs(v));
   return 1.4826 * median(absolute);
+}
+
+// s.d. of a reading whose differences from another of the same these are.  On a grid most may be
+// zero, where a median says nothing.
+double one_of_two(std::vector<double> gaps, double quantum, double far, double heaviest_kurtosis) {
+  if (quantum <= 0) return spread(gaps, heaviest_kurtosis) / std::numbers::sqrt2;
+  for (double& gap : gaps) gap = std::clamp(gap, -far, far);
+  return std::max(spread(gaps, INFINITY) / std::numbers::sqrt2, quantum / std::sqrt(12.0));
 }
 
 }  // namespace
@@ -82,30 +90,20 @@ std::vector<ReadingGap> late_reading_gaps(const std::vector<ResidualTrial>& tria
   return gaps;
 }
 
-PoseNoise reading_noise(std::span<const ReadingGap> gaps, double quantum_m) {
+PoseNoise reading_noise(std::span<const ReadingGap> gaps, const PoseGrid& grid) {
   if (gaps.size() < kFewestGaps) return {0, 0};
-  std::vector<double> position, heading, clipped;
+  std::vector<double> position, heading;
   std::size_t shared = 0;
   for (const ReadingGap& g : gaps) {
     if (g.gap.isZero(1e-12)) ++shared;
     position.insert(position.end(), {g.gap[0], g.gap[1]});
-    for (int k = 0; k < 2; ++k) clipped.push_back(std::clamp(g.gap[k], -kFarGap_m, kFarGap_m));
     heading.push_back(g.gap[2]);
   }
-  // On a coarse grid positions repeat, but headings do not.
+  // On a coarse grid positions repeat, or headings do, but not both.
   if (2 * shared > gaps.size()) return {0, 0};
-  PoseNoise noise;
-  if (quantum_m > 0) {
-    // Most gaps may be zero, where a median says nothing.
-    noise.position_m =
-        std::max(spread(clipped, INFINITY) / std::numbers::sqrt2, quantum_m / std::sqrt(12.0));
-  } else {
-    noise.position_m = spread(position, kHeavyPosition) / std::numbers::sqrt2;
-  }
-  noise.heading_rad = spread(heading, kHeavyHeading) / std::numbers::sqrt2;
-  noise.position_m = std::max(noise.position_m, 1e-4);
-  noise.heading_rad = std::max(noise.heading_rad, 1e-3);
-  return noise;
+  return {std::max(1e-4, one_of_two(std::move(position), grid.step_m, kFarGap_m, kHeavyPosition)),
+          std::max(1e-3, one_of_two(std::move(heading), grid.heading_step_rad, kFarGap_rad,
+                                    kHeavyHeading))};
 }
 
 }  // namespace gapfarm

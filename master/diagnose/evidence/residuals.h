@@ -11,6 +11,7 @@
 #include "common/score/fitness.h"
 #include "common/score/scale_mixture.h"
 #include "common/trials/context.h"
+#include "common/trials/pose_readings.h"
 #include "common/trials/trial.h"
 #include "master/diagnose/push/push_geometry.h"
 
@@ -87,9 +88,9 @@ inline constexpr std::size_t kFewestGaps = 20;
 
 // Noise of one reading, from two readings of one pose: the gaps' standard deviation over sqrt(2),
 // or its estimate from the median where their tails are heavy, as late readings make them.  Kept
-// above 0.1 mm and 1 mrad, and on a grid above `quantum_m` / sqrt(12).  {0, 0} says that the gaps
+// above 0.1 mm and 1 mrad, and on a grid above its step / sqrt(12).  {0, 0} says that the gaps
 // do not show: fewer than kFewestGaps, or most exactly zero because the log shares readings between
 // trials. The noise then comes from residuals (refit_drive_noise() with fit_pose).
-PoseNoise reading_noise(std::span<const ReadingGap> gaps, double quantum_m);
+PoseNoise reading_noise(std::span<const ReadingGap> gaps, const PoseGrid& grid);
 
 }  // namespace gapfarm

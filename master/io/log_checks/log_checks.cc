@@ -3,16 +3,19 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <tuple>
 
 #include "common/base/text.h"
+#include "common/trials/pose_readings.h"
 #include "master/io/log_checks/sanity.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kManyCopies = 0.2;  // of the trials that moved
-constexpr double kManySteps = 0.02;  // back in time, of all steps
+constexpr double kManyCopies = 0.2;             // of the trials that moved
+constexpr double kLeastHeadingStep_rad = 5e-3;  // finer ones are hidden by any tracker's noise
+constexpr double kManySteps = 0.02;             // back in time, of all steps
 constexpr std::array<LengthUnit, 5> kUnits = {{{"millimetres", 0.001},
                                                {"centimetres", 0.01},
                                                {"inches", 0.0254},
@@ -74,6 +77,17 @@ void check_copies(const TrialLog& log, std::vector<SanityFinding>* findings) {
                            "): no two drives are that much alike.",
                        "Leave the copies out: they count the same evidence twice.",
                        many ? Severity::kUnusable : Severity::kNote});
+}
+
+void check_headings(const TrialLog& log, std::vector<SanityFinding>* findings) {
+  const double step = pose_grid(log.trials).heading_step_rad;
+  if (step < kLeastHeadingStep_rad) return;
+  findings->push_back({"headings_rounded",
+                       "Headings are rounded to steps of " + few_digits(1e3 * step) + " mrad (" +
+                           few_digits(step * 180 / std::numbers::pi) + " deg).",
+                       "Log more digits of them: rounding adds " +
+                           few_digits(1e3 * step / std::sqrt(12.0)) + " mrad to every reading.",
+                       Severity::kNote});
 }
 
 void check_clock(const TrialLog& log, std::vector<SanityFinding>* findings) {

@@ -13,6 +13,8 @@ namespace gapfarm {
 void check_count(const TrialLog& log, std::vector<SanityFinding>* findings);
 // Rows that repeat another one's poses to the last digit although something moved.
 void check_copies(const TrialLog& log, std::vector<SanityFinding>* findings);
+// Headings that were rounded to a grid.
+void check_headings(const TrialLog& log, std::vector<SanityFinding>* findings);
 // Times that run backward within a session.
 void check_clock(const TrialLog& log, std::vector<SanityFinding>* findings);
 

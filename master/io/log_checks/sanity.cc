@@ -123,6 +123,7 @@ std::vector<SanityFinding> check_sanity(const Problem& problem) {
   if (problem.scenario == "push") check_pushes(problem, &findings);
   for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
   check_clock(problem.log, &findings);
+  check_headings(problem.log, &findings);
   const bool still = contains(findings, "no_motion", &SanityFinding::name);
   if (!still) check_copies(problem.log, &findings);
   check_count(problem.log, &findings);

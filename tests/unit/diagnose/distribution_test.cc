@@ -39,14 +39,14 @@ Chains chains(std::uint64_t seed, double share, double latency_s, std::size_t tr
 
 TEST(ReadingNoise, RecoversIt) {
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    const PoseNoise noise = reading_noise(chains(seed, 0, 0).gaps, 0);
+    const PoseNoise noise = reading_noise(chains(seed, 0, 0).gaps, {});
     EXPECT_NEAR(noise.position_m / kNoise.position_m, 1, 0.1) << seed;
     EXPECT_NEAR(noise.heading_rad / kNoise.heading_rad, 1, 0.1) << seed;
   }
 }
 
 TEST(ReadingNoise, AFewLateReadingsHardlyWidenIt) {
-  const PoseNoise noise = reading_noise(chains(1, 0.1, 0.1).gaps, 0);
+  const PoseNoise noise = reading_noise(chains(1, 0.1, 0.1).gaps, {});
   EXPECT_NEAR(noise.position_m / kNoise.position_m, 1, 0.2);
   EXPECT_NEAR(noise.heading_rad / kNoise.heading_rad, 1, 0.3);
 }
@@ -54,20 +54,23 @@ TEST(ReadingNoise, AFewLateReadingsHardlyWidenIt) {
 TEST(ReadingNoise, HoldsTheRoundingOfAGrid) {
   std::vector<ReadingGap> gaps = chains(1, 0, 0).gaps;
   for (ReadingGap& g : gaps) g.gap.head<2>() = 0.02 * (g.gap.head<2>() / 0.02).array().round();
-  EXPECT_GE(reading_noise(gaps, 0.02).position_m, 0.02 / std::sqrt(12.0));
+  EXPECT_GE(reading_noise(gaps, {.step_m = 0.02}).position_m, 0.02 / std::sqrt(12.0));
+  gaps = chains(1, 0, 0).gaps;
+  for (ReadingGap& g : gaps) g.gap[2] = 0.1 * std::round(g.gap[2] / 0.1);
+  EXPECT_GE(reading_noise(gaps, {.heading_step_rad = 0.1}).heading_rad, 0.1 / std::sqrt(12.0));
 }
 
 TEST(ReadingNoise, IsUnknownWithoutTwoReadingsOfAPose) {
   std::vector<ReadingGap> gaps = chains(1, 0, 0).gaps;
   gaps.resize(19);
-  EXPECT_EQ(reading_noise(gaps, 0).position_m, 0);
-  EXPECT_EQ(reading_noise(gaps, 0).heading_rad, 0);
+  EXPECT_EQ(reading_noise(gaps, {}).position_m, 0);
+  EXPECT_EQ(reading_noise(gaps, {}).heading_rad, 0);
   gaps = chains(1, 0, 0).gaps;
   for (std::size_t i = 0; i < gaps.size(); ++i) {
     if (i % 10 != 0) gaps[i].gap.setZero();  // the log shares nine readings of ten
   }
-  EXPECT_EQ(reading_noise(gaps, 0.01).position_m, 0);
-  EXPECT_EQ(reading_noise(gaps, 0.01).heading_rad, 0);
+  EXPECT_EQ(reading_noise(gaps, {.step_m = 0.01}).position_m, 0);
+  EXPECT_EQ(reading_noise(gaps, {.step_m = 0.01}).heading_rad, 0);
 }
 
 TEST(FitLatency, FindsShareAndAge) {
@@ -91,7 +94,7 @@ TEST(FitLatency, FindsShareAndAge) {
 TEST(FitLatency, FindsNoneInNoise) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Chains made = chains(seed, 0, 0);
-    const PoseNoise noise = reading_noise(made.gaps, 0);
+    const PoseNoise noise = reading_noise(made.gaps, {});
     EXPECT_LT(fit_latency(made.gaps, made.end_velocity, noise, 600).gain, 8) << seed;
   }
 }

@@ -1,6 +1,7 @@
 // Checks of logs of drives that were drawn from plain kinematics and then spoiled in one way.
 #include "master/io/log_checks/sanity.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -270,6 +271,15 @@ TEST(Sanity, BelievesReadingsThatOthersConfirm) {
     t.X_WE = t.X_WS * exp(0.6 * log(between(t.X_WS, t.X_WE)));
   }
   EXPECT_EQ(impossible_trials(late), std::vector<std::size_t>());
+}
+
+TEST(Sanity, ReportsHeadingsInWholeDegrees) {
+  const double degree = kPi / 180;
+  const Problem log = spoiled(drawn_drives(200), [degree](const Pose& X) {
+    return Pose{X.x, X.y, degree * std::round(X.theta / degree)};
+  });
+  EXPECT_EQ(first_name(log), "headings_rounded");
+  EXPECT_THAT(check_sanity(log).front().text, testing::HasSubstr("(1 deg)"));
 }
 
 TEST(Sanity, LeavesOutWhatIsLikeNoOther) {
