@@ -6,7 +6,9 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <string>
 
+#include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "common/trials/context.h"
@@ -70,7 +72,9 @@ std::optional<Cell> cell_of(const std::vector<Pose>& ends) {
   return cell;
 }
 
-using Command = std::array<double, 3>;  // left, right, duration
+// What was commanded, and for a piece what the log says of the push ("start"): pushes differ by
+// more than their command.
+using Command = std::vector<std::string>;
 using Cells = std::map<Command, std::optional<Cell>>;
 
 // Of few drives a false one or two make the spread.
@@ -100,15 +104,23 @@ class Drives {
     std::vector<DrivenCommand> driven;
     std::map<Command, std::vector<Pose>> ends;
     for (const Trial& t : trials_) {
-      const CommandSpec c = resolved_command(t, problem.commands);
-      driven.push_back({c.left, c.right, c.duration_s});
-      commands_.push_back({c.left, c.right, c.duration_s});
+      commands_.push_back(t.extra);
+      commands_.back().push_back(t.command);
+      driven.emplace_back();
+      if (t.tip.empty()) {
+        const CommandSpec c = resolved_command(t, problem.commands);
+        driven.back() = {c.left, c.right, c.duration_s};
+        commands_.back() = {formatted("%.17g %.17g %.17g", c.left, c.right, c.duration_s)};
+      }
       ends[commands_.back()].push_back(between(t.X_WS, t.X_WE));
       ++same_end_[key(t.X_WE)];
     }
     for (const auto& [command, poses] : ends) cells_[command] = cell_of(poses);
     reach_beyond_noise(unsure, &cells_);
     const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+    std::size_t moved = 0;
+    for (const TrialContext& context : contexts) moved += context.moved ? 1 : 0;
+    chained_ = 2 * moved < contexts.size();
     next_.resize(trials_.size());
     moved_.resize(trials_.size());
     for (std::size_t i = 0; i < contexts.size(); ++i) {
@@ -117,6 +129,9 @@ class Drives {
       if (contexts[i].previous) next_[*contexts[i].previous] = i;
     }
   }
+
+  // Whether most trials begin where the one before ends: else nothing is confirmed anyway.
+  bool chained() const { return chained_; }
 
   Reading end_of(std::size_t i) const {
     const Trial& t = trials_[i];
@@ -154,6 +169,7 @@ class Drives {
   Cells cells_;
   std::map<Key, std::size_t> same_end_;
   std::vector<std::optional<std::size_t>> previous_, next_;  // in the session
+  bool chained_ = false;
   std::vector<bool> moved_;  // where it begins is not where the one before ends
 };
 
@@ -184,7 +200,7 @@ std::vector<std::size_t> false_readings(const Problem& problem) {
         readings.back() != Reading::kFine && readings.back() != Reading::kUnconfirmed;
     distances.push_back(known ? 0 : drives.distance(i));
   }
-  const bool proven = count[Reading::kContradicted] >= kFewestProven;
+  const bool proven = drives.chained() && count[Reading::kContradicted] >= kFewestProven;
   const std::size_t off_the_way = count[Reading::kContradicted] + count[Reading::kUnconfirmed];
   const bool by_chance = count[Reading::kLate] * kOfWhichByChance <= off_the_way;
   const double limit = farthest_of_others(distances);

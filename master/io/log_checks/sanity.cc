@@ -95,12 +95,26 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
   }
   if (suspicious) return;
   check_turning(samples, limits, findings);
-  const std::vector<std::size_t> fast = too_fast_trials(problem), wrong = false_readings(problem);
-  std::vector<std::size_t> others;
-  std::ranges::set_difference(wrong, fast, std::back_inserter(others));
-  note_rows(problem, fast, "impossible_rows",
+}
+
+struct ImpossibleTrials {
+  std::vector<std::size_t> fast, contradicted;  // no trial is both
+};
+
+ImpossibleTrials find_impossible(const Problem& problem) {
+  ImpossibleTrials found;
+  if (has_drives(problem)) found.fast = too_fast_trials(problem);
+  if (!has_drives(problem) && problem.scenario != "push") return found;
+  std::ranges::set_difference(false_readings(problem), found.fast,
+                              std::back_inserter(found.contradicted));
+  return found;
+}
+
+void note_impossible(const Problem& problem, std::vector<SanityFinding>* findings) {
+  const ImpossibleTrials found = find_impossible(problem);
+  note_rows(problem, found.fast, "impossible_rows",
             "end farther from their start than twice the log's own speed leads", findings);
-  note_rows(problem, others, "false_readings",
+  note_rows(problem, found.contradicted, "false_readings",
             "end where no other of their command does, and the reading before or after contradicts "
             "theirs, others repeat it to the last digit, or nothing else is as far off",
             findings);
@@ -109,10 +123,9 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
 }  // namespace
 
 std::vector<std::size_t> impossible_trials(const Problem& problem) {
-  if (!has_drives(problem)) return {};
-  const std::vector<std::size_t> fast = too_fast_trials(problem), wrong = false_readings(problem);
+  const ImpossibleTrials found = find_impossible(problem);
   std::vector<std::size_t> rows;
-  std::ranges::set_union(fast, wrong, std::back_inserter(rows));
+  std::ranges::merge(found.fast, found.contradicted, std::back_inserter(rows));
   return rows;
 }
 
@@ -121,6 +134,7 @@ std::vector<SanityFinding> check_sanity(const Problem& problem) {
   if (problem.log.trials.empty()) return findings;
   if (has_drives(problem)) check_drives(problem, &findings);
   if (problem.scenario == "push") check_pushes(problem, &findings);
+  if (findings.empty()) note_impossible(problem, &findings);
   for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
   check_clock(problem.log, &findings);
   check_headings(problem.log, &findings);

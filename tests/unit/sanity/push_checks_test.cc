@@ -9,6 +9,7 @@
 #include "common/parameters/push.h"
 #include "common/random/stream.h"
 #include "master/io/log_checks/log_checks.h"
+#include "master/io/log_checks/sanity.h"
 
 namespace gapfarm::push_checks_test {
 
@@ -45,6 +46,14 @@ std::string named(const Problem& problem) {
   std::vector<SanityFinding> findings;
   check_pushes(problem, &findings);
   return findings.empty() ? "" : findings.front().name;
+}
+
+TEST(PushChecks, LeaveOutPiecesThatTheTrackerHasLost) {
+  Problem log = pushed();
+  EXPECT_EQ(impossible_trials(log), std::vector<std::size_t>());
+  const std::vector<std::size_t> lost = {3, 4, 11};
+  for (const std::size_t row : lost) log.log.trials[row].X_WE = {2, 2, 0};
+  EXPECT_EQ(impossible_trials(log), lost);
 }
 
 TEST(PushChecks, NameHowPosesDoNotFitTheFingersWay) {
