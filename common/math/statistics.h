@@ -18,6 +18,10 @@ double mean(std::span<const double> values);
 // The median; the mean of the middle two for an even count.  REQUIRES: not empty, all finite.
 double median(std::span<const double> values);
 
+// Standard deviation about `centre` by the median deviation, as of a Gaussian.  REQUIRES: as
+// median().
+double median_deviation(std::span<const double> values, double centre = 0);
+
 // Sample quantile, linear between order statistics (type 7 of Hyndman and Fan 1996).
 // REQUIRES: not empty, all finite, `share` in [0, 1].
 double quantile(std::span<const double> values, double share);

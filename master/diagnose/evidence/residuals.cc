@@ -26,9 +26,7 @@ double spread(const std::vector<double>& values, double heaviest_kurtosis) {
   }
   if (second <= 0) return 0;
   if (fourth / squared(second) < heaviest_kurtosis) return std::sqrt(second);
-  std::vector<double> absolute;
-  for (double v : values) absolute.push_back(std::abs(v));
-  return 1.4826 * median(absolute);
+  return median_deviation(values);
 }
 
 // s.d. of a reading whose differences from another of the same these are.  On a grid most may be

@@ -253,7 +253,7 @@ class Looker {
       left = v.u - means;
       std::vector<double> sizes;
       for (const double value : left) sizes.push_back(std::abs(value));
-      limit = kOutlierSds * std::max(1.0, 1.4826 * median(sizes));
+      limit = kOutlierSds * std::max(1.0, median_deviation(sizes));
       for (Eigen::Index i = 0; i < left.size(); ++i) {
         clean[i] = std::abs(left[i]) > limit ? means[i] : v.u[i];
       }

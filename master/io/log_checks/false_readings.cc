@@ -22,7 +22,6 @@ constexpr std::size_t kFewestSamePose = 3;
 constexpr std::size_t kFewestProven = 3;     // for those that nothing confirms to be of their kind
 constexpr double kDeviations = 8;            // beyond what moves leave unsure: no noise is that far
 constexpr double kMostSpread = 3;            // over the median command's
-constexpr double kMedianOfNormal = 1.4826;   // a standard deviation over its median deviation
 constexpr std::size_t kOfWhichByChance = 4;  // false readings, one on the way
 constexpr std::size_t kOfWhichAlone = 200;   // trials, one that is like no other
 constexpr double kTimesTheOthers = 4;        // as any other: no effect of few trials
@@ -51,11 +50,6 @@ struct Cell {
   }
 };
 
-double spread(std::vector<double> values, double middle) {
-  for (double& v : values) v = std::abs(v - middle);
-  return kMedianOfNormal * median(values);
-}
-
 // Their reach is their spread as yet.
 std::optional<Cell> cell_of(const std::vector<Pose>& ends) {
   if (ends.size() < kFewestRepeats) return std::nullopt;
@@ -67,8 +61,8 @@ std::optional<Cell> cell_of(const std::vector<Pose>& ends) {
   }
   Cell cell{{median(x), median(y), circular_centre(theta)}};
   for (double& t : theta) t = wrap_angle(t - cell.end.theta);
-  cell.reach_m = std::max(spread(x, cell.end.x), spread(y, cell.end.y));
-  cell.reach_rad = spread(theta, 0);
+  cell.reach_m = std::max(median_deviation(x, cell.end.x), median_deviation(y, cell.end.y));
+  cell.reach_rad = median_deviation(theta);
   return cell;
 }
 

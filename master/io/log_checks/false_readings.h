@@ -15,8 +15,7 @@ namespace gapfarm {
 // - where its end is, to the last digit, that of others: what a tracker reports that has lost the
 //   robot;
 // - where there are some of these and no other reading confirms its end, in a log whose trials
-// begin
-//   where the one before ends;
+//   begin where the one before ends;
 // - where it ends four times as far off as any other, and is one of 200.
 // What was read on the way is late rather than false (pose_latency) unless it is one of few among
 // these; a robot that slipped is seen twice where it is.  Empty where commands have too few
