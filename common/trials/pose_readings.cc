@@ -18,7 +18,8 @@ constexpr double kLeastStep = 2e-4;  // m, rad
 // given one, so that seven do in one case of a million.
 constexpr std::size_t kLeastDistinct = 7;
 constexpr double kOffGrid = 0.03;   // of the step
-constexpr double kDigits = 1.2e-5;  // a log prints 1e-5 m or rad: half of that at each of two ends
+constexpr double kDigit = 1e-5;     // that a log prints, m, rad
+constexpr double kDigits = 1.2e-5;  // half of one at each of two ends
 // Of the readings, and of their distinct values: few outliers may be many among those of a coarse
 // grid.
 constexpr double kLeastOnGrid = 0.95;
@@ -96,9 +97,14 @@ double grid_of(const std::vector<double>& readings, const std::vector<double>& v
       differences.push_back(values[i] - values[i - lag]);
     }
   }
+  const double range = values.back() - values.front();
   double widest = 0;
   for (double likely : likely_steps(values)) {
-    const double step = refined(likely, differences, values.back() - values.front());
+    // So many distinct values as these fit on no grid of that step: a line holds few digits.
+    const double on_line = 1 + 2 * std::max(kDigits, kOffGrid * likely) / kDigit;
+    const double most = (range / likely + 1) * on_line;
+    if (kLeastDistinctOnGrid * static_cast<double>(values.size()) > most) continue;
+    const double step = refined(likely, differences, range);
     if (step <= kLeastStep * (1 + 1e-6) || step <= widest) continue;
     const double tolerance = std::max(kDigits, kOffGrid * step);
     if (share_on_grid(values, step, tolerance) < kLeastDistinctOnGrid) continue;
