@@ -64,8 +64,14 @@ double draw_tail_scale(double tail, Stream& stream) {
   return scales.back().scale;
 }
 
-TailedDensity::TailedDensity(const NoiseTails& tails)
-    : tails_(tails), drive_(tail_scales(tails.drive)), reading_(tail_scales(tails.reading)) {}
+TailedDensity::TailedDensity(const NoiseTails& tails) : tails_(tails) {
+  const std::vector<TailScale> readings = tail_scales(tails.reading);
+  for (const TailScale& a : tail_scales(tails.drive)) {
+    for (const TailScale& b : readings) {
+      scales_.push_back({a.scale, b.scale, std::log(a.weight * b.weight)});
+    }
+  }
+}
 
 template <int N>
 Result<double> TailedDensity::log_density_of(const Eigen::Matrix<double, N, 1>& residual,
@@ -88,12 +94,10 @@ Result<double> TailedDensity::log_density_of(const Eigen::Matrix<double, N, 1>& 
   const Array squares = (axes.eigenvectors().transpose() * lower.solve(residual)).array().square();
   std::array<double, kScales * kScales> logs;
   std::size_t count = 0;
-  for (const TailScale& a : drive_) {
-    for (const TailScale& b : reading_) {
-      const Array variances = a.scale * spread + b.scale;
-      logs[count++] = std::log(a.weight * b.weight) -
-                      0.5 * (std::log(variances.prod()) + (squares / variances).sum());
-    }
+  for (const ScalePair& pair : scales_) {
+    const Array variances = pair.drive * spread + pair.reading;
+    logs[count++] =
+        pair.log_weight - 0.5 * (std::log(variances.prod()) + (squares / variances).sum());
   }
   const double mixture = log_sum_exp(std::span(logs.data(), count)) -
                          0.5 * (N * kLogTwoPi + readings->log_determinant());

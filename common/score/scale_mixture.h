@@ -63,8 +63,13 @@ class TailedDensity {
                                 const Eigen::Matrix<double, N, N>& reading,
                                 double outlier_share) const;
 
+  struct ScalePair {
+    double drive = 1, reading = 1;
+    double log_weight = 0;
+  };
+
   NoiseTails tails_;
-  std::vector<TailScale> drive_, reading_;
+  std::vector<ScalePair> scales_;
 };
 
 // Mean log density of `draws` residuals that are spread with `tails`; where these are the density's

@@ -95,9 +95,10 @@ MoveTolerance estimate_move_tolerance(const TrialLog& log) {
 }
 
 std::vector<TrialContext> trial_contexts(const TrialLog& log,
-                                         std::span<const DrivenCommand> commands) {
+                                         std::span<const DrivenCommand> commands,
+                                         const std::optional<MoveTolerance>& known) {
   assert(commands.size() == log.trials.size());
-  const MoveTolerance limit = estimate_move_tolerance(log);
+  const MoveTolerance limit = known ? *known : estimate_move_tolerance(log);
   const auto before = predecessors(log);
   std::vector<TrialContext> contexts(log.trials.size());
   for (std::size_t i = 0; i < contexts.size(); ++i) {

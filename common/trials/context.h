@@ -51,8 +51,10 @@ struct MoveTolerance {
 // grid it is no less than what rounding one resting pose twice may put between them.
 MoveTolerance estimate_move_tolerance(const TrialLog& log);
 
-// One context a trial, in the log's order.  REQUIRES: one command a trial.
+// One context a trial, in the log's order; `known`: the log's tolerance.  REQUIRES: one
+// command a trial.
 std::vector<TrialContext> trial_contexts(const TrialLog& log,
-                                         std::span<const DrivenCommand> commands);
+                                         std::span<const DrivenCommand> commands,
+                                         const std::optional<MoveTolerance>& known = {});
 
 }  // namespace gapfarm

@@ -160,10 +160,10 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
 }
 
 PreparedLog prepare_log(const Problem& problem, const std::optional<Eigen::Vector2d>& frame_m) {
-  PreparedLog prepared{problem, 0, 0, check_sanity(problem)};
+  std::vector<std::size_t> impossible;
+  PreparedLog prepared{problem, 0, 0, check_sanity(problem, &impossible)};
   if (any_unusable(prepared.sanity)) return prepared;
   TrialLog& log = prepared.problem.log;
-  const std::vector<std::size_t> impossible = impossible_trials(problem);
   for (auto row = impossible.rbegin(); row != impossible.rend(); ++row) {
     log.trials.erase(log.trials.begin() + static_cast<std::ptrdiff_t>(*row));
   }

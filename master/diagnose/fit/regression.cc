@@ -65,14 +65,14 @@ Gain Regression::gain_beyond(const Eigen::MatrixXd& columns, double expected) co
   return gain_of(c, left_, kAbsorbed * columns.colwise().squaredNorm().mean(), expected);
 }
 
-Eigen::VectorXd Regression::each_gain(const Eigen::MatrixXd& columns) const {
+Eigen::VectorXd Regression::each_gain(const Eigen::SparseMatrix<double>& columns) const {
   // The data have nothing of the basis left in them, so neither has their product with a column.
   const Eigen::VectorXd product = columns.transpose() * left_.head(rows_);
-  const Eigen::MatrixXd held = basis_.topRows(rows_).transpose() * columns;
+  const Eigen::MatrixXd held = columns.transpose() * basis_.topRows(rows_);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(columns.cols());
   for (Eigen::Index j = 0; j < columns.cols(); ++j) {
     const double whole = columns.col(j).squaredNorm();
-    const double own = whole - held.col(j).squaredNorm();
+    const double own = whole - held.row(j).squaredNorm();
     if (own > kAbsorbed * whole) squares[j] = product[j] * product[j] / own;
   }
   return squares;

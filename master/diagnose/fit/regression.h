@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
 
 namespace gapfarm {
 
@@ -29,7 +30,7 @@ class Regression {
   // What a column would explain with a coefficient no farther than these.
   double gain_within(const Eigen::VectorXd& column, double least, double most) const;
   // Squares that each column would explain beyond the basis were it alone.
-  Eigen::VectorXd each_gain(const Eigen::MatrixXd& columns) const;
+  Eigen::VectorXd each_gain(const Eigen::SparseMatrix<double>& columns) const;
   // Fisher information of the columns' coefficients beyond the basis.
   Eigen::MatrixXd information(const Eigen::MatrixXd& columns) const;
   // What a column's squares have beyond the basis.

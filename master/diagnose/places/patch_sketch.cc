@@ -11,7 +11,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kSteps = 16;  // of a way
+constexpr std::size_t kSteps = 16;  // of a way
 // A fitted share of the mark scales it, so few stand for all; but where a robot can no longer turn
 // its way out of a patch, that is so from some ratio on.
 constexpr std::array<double, 8> kRatios = {0.1, 0.14, 0.2, 0.3, 0.45, 0.67, 1.6, 2.5};
@@ -80,19 +80,20 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study)
     const Twist whole = motion_of(study, i);
     driven.step_s = study.cells[trial.cell].command.duration_s / kSteps;
     driven.step = whole / kSteps;
-    driven.half = exp(Twist(driven.step / 2));
-    driven.whole = exp(driven.step);
+    driven.half = placed(exp(Twist(driven.step / 2)));
     driven.X_WE = trial.X_WS * exp(whole);
-    for (int k = 0; k < kSteps; ++k) {
-      driven.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
-      driven.contacts.push_back(contacts_at(trial.X_WS * exp(Twist(whole * (k + 0.5) / kSteps))));
+    const Placed next = placed(exp(driven.step));
+    driven.X_WB = {placed(trial.X_WS)};
+    for (std::size_t k = 0; k < kSteps; ++k) {
+      driven.contacts.push_back(contacts_at(driven.X_WB[k] * driven.half));
+      driven.X_WB.push_back(driven.X_WB[k] * next);
       for (const Eigen::Vector2d& contact : driven.contacts.back()) {
         driven.low = driven.low.cwiseMin(contact.array());
         driven.high = driven.high.cwiseMax(contact.array());
       }
     }
   }
-  for (double ratio : kRatios) shifts_.push_back(shifts(ratio));
+  for (double ratio : kRatios) steps_.push_back(steps(ratio));
   lay_grid();
 }
 
@@ -103,25 +104,27 @@ void PatchSketch::lay_grid() {
     high = high.cwiseMax(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
   }
   const double step = std::max(kPatchStep_m * scale_, (high - low).maxCoeff() / kMostSteps);
-  std::vector<Eigen::VectorXd> marks;
-  for (const std::size_t r : kGridRatios) {
-    for (double radius_m : kPatchRadii_m) {
-      const double radius = radius_m * scale_;
-      for (double x = low.x(); x <= high.x(); x += step) {
-        for (double y = low.y(); y <= high.y(); y += step) {
-          const Patch patch = {x, y, radius, kRatios[r]};
-          Eigen::VectorXd mark = column(patch, shifts_[r]);
-          if ((mark.array() != 0).count() < kFewestMarked) continue;
-          grid_.push_back(patch);
-          marks.push_back(std::move(mark));
+  std::vector<const std::vector<Steps>*> of_grid;
+  for (const std::size_t r : kGridRatios) of_grid.push_back(&steps_[r]);
+  std::vector<Eigen::Triplet<double>> marks;
+  for (double radius_m : kPatchRadii_m) {
+    for (double x = low.x(); x <= high.x(); x += step) {
+      for (double y = low.y(); y <= high.y(); y += step) {
+        const auto of_ratios = columns({x, y, radius_m * scale_, 1}, of_grid);
+        for (std::size_t k = 0; k < of_ratios.size(); ++k) {
+          if (of_ratios[k].nonZeros() < kFewestMarked) continue;
+          const auto column = static_cast<Eigen::Index>(grid_.size());
+          for (Eigen::SparseVector<double>::InnerIterator it(of_ratios[k]); it; ++it) {
+            marks.emplace_back(it.index(), column, it.value());
+          }
+          grid_.push_back({x, y, radius_m * scale_, kRatios[kGridRatios[k]]});
         }
       }
     }
   }
-  marks_.resize(3 * study_.size(), marks.size());
-  for (std::size_t k = 0; k < marks.size(); ++k) {
-    marks_.col(k) = marks[k];
-  }
+  marks_.resize(static_cast<Eigen::Index>(3 * study_.size()),
+                static_cast<Eigen::Index>(grid_.size()));
+  marks_.setFromTriplets(marks.begin(), marks.end());
 }
 
 // Newton's method on a convex function; a step that does not lower it is halved.
@@ -160,69 +163,83 @@ Eigen::Vector3d PatchSketch::twist(double left, double right,
   return v;
 }
 
-std::vector<PatchSketch::Shifts> PatchSketch::shifts(double ratio) const {
-  std::vector<Shifts> all;
+// The base's steps with what the twist on the disc differs by from that on an even floor.
+std::vector<PatchSketch::Steps> PatchSketch::steps(double ratio) const {
+  std::vector<std::array<Eigen::Vector3d, 16>> shifts;  // of the twist, by cell
   for (const Cell& cell : study_.cells) {
     const double left = cell.command.left * speed_m_s_, right = cell.command.right * speed_m_s_;
     const Eigen::Vector3d even = twist(left, right, Eigen::Vector4d::Ones());
-    Shifts& shifts = all.emplace_back();
-    for (std::size_t set = 0; set < shifts.size(); ++set) {
+    auto& of_cell = shifts.emplace_back();
+    for (std::size_t set = 0; set < of_cell.size(); ++set) {
       Eigen::Vector4d friction = Eigen::Vector4d::Ones();
       for (std::size_t c = 0; c < 4; ++c) {
         if ((set >> c & 1) != 0) friction[c] = ratio;
       }
-      shifts[set] = twist(left, right, friction) - even;
+      of_cell[set] = twist(left, right, friction) - even;
+    }
+  }
+  std::vector<Steps> all(driven_.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto& of_cell = shifts[study_.trials[i].cell];
+    for (std::size_t set = 0; set < of_cell.size(); ++set) {
+      all[i][set] = placed(exp(Twist(driven_[i].step + of_cell[set] * driven_[i].step_s)));
     }
   }
   return all;
 }
 
-PatchSketch::Contacts PatchSketch::contacts_at(const Pose& X_WB) const {
-  Contacts contacts;
-  const double c = std::cos(X_WB.theta), s = std::sin(X_WB.theta);
-  for (std::size_t k = 0; k < 4; ++k) {
-    const Eigen::Vector2d& at = contacts_[k];
-    contacts[k] = {X_WB.x + c * at.x() - s * at.y(), X_WB.y + s * at.x() + c * at.y()};
+PatchSketch::Placed PatchSketch::placed(const Pose& X) {
+  return {X.x, X.y, X.theta, std::cos(X.theta), std::sin(X.theta)};
+}
+
+PatchSketch::Contacts PatchSketch::contacts_at(const Placed& X_WB) const {
+  return {X_WB * contacts_[0], X_WB * contacts_[1], X_WB * contacts_[2], X_WB * contacts_[3]};
+}
+
+std::size_t PatchSketch::first_across(const DrivenPath& driven, const Patch& patch) const {
+  const Eigen::Array2d centre(patch[0], patch[1]);
+  const Eigen::Array2d off = (driven.low - centre).cwiseMax(centre - driven.high).cwiseMax(0.0);
+  if (off.matrix().squaredNorm() >= patch[2] * patch[2]) return kSteps;
+  std::size_t k = 0;
+  for (; k < kSteps; ++k) {
+    const unsigned set = inside(driven.contacts[k], patch);
+    if (set != 0 && set != kAllInside) break;
   }
-  return contacts;
+  return k;
 }
 
 // Of the end, in the predicted end's axes.
-Eigen::Vector3d PatchSketch::shift_of(const DrivenPath& driven, const Patch& patch,
-                                      const Shifts& shifts) const {
-  const Eigen::Array2d centre(patch[0], patch[1]);
-  const Eigen::Array2d off = (driven.low - centre).cwiseMax(centre - driven.high).cwiseMax(0.0);
-  if (off.matrix().squaredNorm() >= patch[2] * patch[2]) return Eigen::Vector3d::Zero();
-  std::size_t k = 0;
-  while (k < kSteps) {
-    const unsigned set = inside(driven.contacts[k], patch);
-    if (set != 0 && set != kAllInside) break;
-    ++k;
+Eigen::Vector3d PatchSketch::shift_from(std::size_t first, const DrivenPath& driven,
+                                        const Patch& patch, const Steps& steps) const {
+  Placed X_WB = driven.X_WB[first];
+  for (std::size_t k = first; k < kSteps; ++k) {
+    X_WB = X_WB * steps[inside(contacts_at(X_WB * driven.half), patch)];
   }
-  if (k == kSteps) return Eigen::Vector3d::Zero();
-  Pose X_WB = driven.X_WB[k];
-  for (; k < kSteps; ++k) {
-    const unsigned set = inside(contacts_at(X_WB * driven.half), patch);
-    const Twist more = shifts[set] * driven.step_s;
-    X_WB = X_WB * (set == 0 ? driven.whole : exp(Twist(driven.step + more)));
-  }
-  const Pose shift = between(driven.X_WE, X_WB);
+  const Pose shift = between(driven.X_WE, {X_WB.x, X_WB.y, X_WB.theta});
   return {shift.x, shift.y, shift.theta};
 }
 
-Eigen::VectorXd PatchSketch::column(const Patch& patch, const std::vector<Shifts>& shifts) const {
-  Eigen::VectorXd column = Eigen::VectorXd::Zero(3 * study_.size());
+std::vector<Eigen::SparseVector<double>> PatchSketch::columns(
+    const Patch& patch, std::span<const std::vector<Steps>* const> steps) const {
+  std::vector<Eigen::SparseVector<double>> all(
+      steps.size(), Eigen::SparseVector<double>(static_cast<Eigen::Index>(3 * study_.size())));
   for (std::size_t i = 0; i < study_.size(); ++i) {
-    const Eigen::Vector3d shift = shift_of(driven_[i], patch, shifts[study_.trials[i].cell]);
-    if (shift.isZero(0)) continue;
-    column.segment<3>(3 * i) = study_.whitener[i] * shift;
+    const std::size_t first =
+        study_.ignores(static_cast<Eigen::Index>(i)) ? kSteps : first_across(driven_[i], patch);
+    for (std::size_t k = 0; k < steps.size() && first < kSteps; ++k) {
+      const Eigen::Vector3d mark =
+          study_.whitener[i] * shift_from(first, driven_[i], patch, (*steps[k])[i]);
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        all[k].insertBack(static_cast<Eigen::Index>(3 * i) + c) = mark[c];
+      }
+    }
   }
-  study_.drop_ignored(column);
-  return column;
+  return all;
 }
 
 Eigen::VectorXd PatchSketch::column(const Patch& patch) const {
-  return column(patch, shifts(patch[3]));
+  const std::vector<Steps> own = steps(patch[3]);
+  return columns(patch, std::array{&own}).front();
 }
 
 // Up the nearest hill, in ever smaller steps of place and radius and from ratio to ratio.
@@ -243,7 +260,7 @@ void PatchSketch::climb(const Regression& explained, Place* place) const {
           next.patch[3] = kRatios[to];
         }
         if (next.patch[2] < 0.08 * scale_) continue;
-        next.squares = explained.each_gain(column(next.patch, shifts_[to]))[0];
+        next.squares = explained.each_gain(columns(next.patch, std::array{&steps_[to]}).front())[0];
         if (next.squares <= place->squares * (1 + 1e-9)) continue;
         *place = next;
         better = true;

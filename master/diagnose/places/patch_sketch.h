@@ -3,8 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
 #include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "common/pose/pose.h"
@@ -40,22 +42,39 @@ class PatchSketch {
 
  private:
   using Contacts = std::array<Eigen::Vector2d, 4>;  // world, m
-  struct DrivenPath {                               // that the base predicts of a trial
+  // A pose beside its heading's cosine and sine: composing takes no trigonometry.
+  struct Placed {
+    double x = 0, y = 0, theta = 0, cosine = 1, sine = 0;
+    Eigen::Vector2d operator*(const Eigen::Vector2d& at) const {
+      return {x + cosine * at.x() - sine * at.y(), y + sine * at.x() + cosine * at.y()};
+    }
+    Placed operator*(const Placed& next) const {
+      const Eigen::Vector2d to = *this * Eigen::Vector2d(next.x, next.y);
+      return {to.x(), to.y(), theta + next.theta, cosine * next.cosine - sine * next.sine,
+              sine * next.cosine + cosine * next.sine};
+    }
+  };
+  struct DrivenPath {  // that the base predicts of a trial
     double step_s = 0;
     Twist step = Twist::Zero();
-    Pose half, whole;  // exp() of half of it, and of it
+    Placed half;  // of a step
     Pose X_WE;
-    std::vector<Pose> X_WB;          // where each step begins
+    std::vector<Placed> X_WB;        // where each step begins
     std::vector<Contacts> contacts;  // in its middle
     // Of all of these.
     Eigen::Array2d low = Eigen::Array2d::Constant(INFINITY), high = -low;
   };
-  using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
-  Contacts contacts_at(const Pose& X_WB) const;
-  Eigen::Vector3d shift_of(const DrivenPath& driven, const Patch& patch,
-                           const Shifts& shifts) const;
-  std::vector<Shifts> shifts(double ratio) const;  // by cell
-  Eigen::VectorXd column(const Patch& patch, const std::vector<Shifts>& shifts) const;
+  using Steps = std::array<Placed, 16>;  // what one moves by, by the set of contacts inside
+  static Placed placed(const Pose& X);
+  Contacts contacts_at(const Placed& X_WB) const;
+  // The first step with a part of the contacts inside; kSteps: none.
+  std::size_t first_across(const DrivenPath& driven, const Patch& patch) const;
+  Eigen::Vector3d shift_from(std::size_t first, const DrivenPath& driven, const Patch& patch,
+                             const Steps& steps) const;
+  std::vector<Steps> steps(double ratio) const;  // by trial
+  // Of all ratios' steps one column each.
+  std::vector<Eigen::SparseVector<double>> columns(
+      const Patch& patch, std::span<const std::vector<Steps>* const> steps) const;
   void lay_grid();
   void climb(const Regression& explained, Place* place) const;
   double fitted_ratio(const Regression& explained, const Patch& patch) const;
@@ -66,10 +85,10 @@ class PatchSketch {
   double lateral_ = 1;                       // over longitudinal friction
   double creep_ = 0;
   double speed_m_s_ = 0;
-  std::vector<DrivenPath> driven_;           // by trial
-  std::vector<std::vector<Shifts>> shifts_;  // of kRatios
+  std::vector<DrivenPath> driven_;         // by trial
+  std::vector<std::vector<Steps>> steps_;  // of kRatios
   std::vector<Patch> grid_;
-  Eigen::MatrixXd marks_;  // of the grid's discs
+  Eigen::SparseMatrix<double> marks_;  // of the grid's discs
 };
 
 struct Footprint {

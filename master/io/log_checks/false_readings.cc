@@ -111,7 +111,7 @@ class Drives {
     }
     for (const auto& [command, poses] : ends) cells_[command] = cell_of(poses);
     reach_beyond_noise(unsure, &cells_);
-    const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+    const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven, unsure);
     std::size_t moved = 0;
     for (const TrialContext& context : contexts) moved += context.moved ? 1 : 0;
     chained_ = 2 * moved < contexts.size();

@@ -99,6 +99,12 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
 
 struct ImpossibleTrials {
   std::vector<std::size_t> fast, contradicted;  // no trial is both
+
+  std::vector<std::size_t> rows() const {
+    std::vector<std::size_t> all;
+    std::ranges::merge(fast, contradicted, std::back_inserter(all));
+    return all;
+  }
 };
 
 ImpossibleTrials find_impossible(const Problem& problem) {
@@ -110,8 +116,8 @@ ImpossibleTrials find_impossible(const Problem& problem) {
   return found;
 }
 
-void note_impossible(const Problem& problem, std::vector<SanityFinding>* findings) {
-  const ImpossibleTrials found = find_impossible(problem);
+void note_impossible(const Problem& problem, const ImpossibleTrials& found,
+                     std::vector<SanityFinding>* findings) {
   note_rows(problem, found.fast, "impossible_rows",
             "end farther from their start than twice the log's own speed leads", findings);
   note_rows(problem, found.contradicted, "false_readings",
@@ -123,18 +129,18 @@ void note_impossible(const Problem& problem, std::vector<SanityFinding>* finding
 }  // namespace
 
 std::vector<std::size_t> impossible_trials(const Problem& problem) {
-  const ImpossibleTrials found = find_impossible(problem);
-  std::vector<std::size_t> rows;
-  std::ranges::merge(found.fast, found.contradicted, std::back_inserter(rows));
-  return rows;
+  return find_impossible(problem).rows();
 }
 
-std::vector<SanityFinding> check_sanity(const Problem& problem) {
+std::vector<SanityFinding> check_sanity(const Problem& problem,
+                                        std::vector<std::size_t>* impossible) {
   std::vector<SanityFinding> findings;
   if (problem.log.trials.empty()) return findings;
   if (has_drives(problem)) check_drives(problem, &findings);
   if (problem.scenario == "push") check_pushes(problem, &findings);
-  if (findings.empty()) note_impossible(problem, &findings);
+  const ImpossibleTrials found = find_impossible(problem);
+  if (findings.empty()) note_impossible(problem, found, &findings);
+  if (impossible != nullptr) *impossible = found.rows();
   for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
   check_clock(problem.log, &findings);
   check_headings(problem.log, &findings);
