@@ -4,9 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 
 #include "common/base/suggest.h"
 #include "common/base/try.h"
@@ -75,6 +78,13 @@ Status check_writable(const std::string& path) {
   return {};
 }
 
+// Of any run's or command's simulations: hours of work, which no --force is meant for.
+bool is_store(const std::string& path) {
+  std::array<char, 15> begin = {};
+  std::ifstream(path, std::ios::binary).read(begin.data(), begin.size());
+  return std::string_view(begin.data(), begin.size()) == "SQLite format 3";
+}
+
 bool is_in_place(const std::string& path) {
   std::error_code code;
   const auto status = fs::status(path, code);
@@ -141,6 +151,9 @@ Status Outputs::check(const std::string& path, bool replace) const {
   std::error_code code;
   if (fs::is_directory(path, code)) {
     return Error{path + ": is a folder, expected a file; give another name"};
+  }
+  if (is_store(path)) {
+    return Error{path + ": is a store of simulations, so it cannot be written; give another name"};
   }
   if (!replace && fs::exists(fs::symlink_status(path, code))) {
     return Error{path + ": exists already; give another name, or --force to replace it"};

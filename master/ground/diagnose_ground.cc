@@ -12,6 +12,7 @@
 #include "master/ground/reference.h"
 #include "master/ground/report/ground_report.h"
 #include "master/ground/tolerances.h"
+#include "master/io/log_checks/run_checks.h"
 
 namespace gapfarm {
 namespace {
@@ -108,9 +109,15 @@ Result<GroundDiagnosis> diagnose_by(const GroundRobot& robot, const RunLog& log,
   return diagnose_driven(robot, robot, log, options, {}, std::move(question));
 }
 
-Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
+Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& logged,
                                         const GroundDiagnoseOptions& options) {
-  return guarded([&]() -> Result<GroundDiagnosis> {
+  const RunChecks checks = check_runs(logged);
+  if (checks.none_is_left(logged)) {
+    return Error{joined(checks.findings, " ",
+                        [](const SanityFinding& f) { return f.text + " " + f.remedy; })};
+  }
+  const RunLog log = useful_runs(logged, checks);
+  auto result = guarded([&]() -> Result<GroundDiagnosis> {
     const RunLog* reference = options.reference ? &*options.reference : nullptr;
     const bool measured = has_wheel_speeds(robot, log) &&
                           (reference == nullptr || has_wheel_speeds(robot, *reference));
@@ -123,9 +130,15 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
                            measure_wheel_loop(robot, log, reference, options.seed),
                            ask_what_is_wrong(driven, wheels));
   });
+  if (!result) return result;
+  std::vector<SanityFinding>& sanity = result->diagnosis.sanity;
+  sanity.insert(sanity.end(), checks.findings.begin(), checks.findings.end());
+  return result;
 }
 
-std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
+namespace {
+
+std::vector<SanityFinding> wrong_way_round(const GroundRobot& robot, const RunLog& log) {
   GroundQuestion question = ask_what_is_wrong(robot, log);
   const WindowSettings windows = {{2}, 0.5};
   const auto found = [&](std::size_t hypothesis, const std::string& evidence) {
@@ -146,6 +159,16 @@ std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunL
                fmt::format("what the robot's file expects is {:.1f} times as near to what was "
                            "measured.",
                            fault->shrinks));
+}
+
+}  // namespace
+
+std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
+  RunChecks checks = check_runs(log);
+  if (checks.none_is_left(log)) return checks.findings;
+  std::vector<SanityFinding> findings = wrong_way_round(robot, useful_runs(log, checks));
+  findings.insert(findings.end(), checks.findings.begin(), checks.findings.end());
+  return findings;
 }
 
 void emit_faults(const GroundWork& work, const GroundSearch& search) {

@@ -1,0 +1,284 @@
+#include "master/io/log_checks/run_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "common/base/ranges.h"
+#include "common/math/statistics.h"
+#include "common/pose/pose.h"
+#include "master/io/log_checks/log_checks.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kMoves_m =
+    0.2;  // of nine tenths of a run's poses, from its middle: no tracker's noise
+constexpr double kLeastGap_s = 10;  // twice the longest windows
+constexpr double kTimesUsualGap = 50;
+// Of a step over the commonest and over those about it: no robot gathers speed so fast.
+constexpr double kTimesUsualStep = 20;
+constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;  // more is no step of a heading
+constexpr std::size_t kNeighbours = 4;                        // either way
+constexpr double kUsualShare = 0.8;  // of the steps are shorter: a tracker may lose some
+constexpr double kMostLost = 0.1;    // of a run, before the tracker found the robot
+
+std::string name_of(const LoggedRun& run) { return "run " + run.run; }
+
+bool is_commanded(const LoggedRun& run) {
+  return std::ranges::any_of(run.commands, [](const CommandRow& row) {
+    return std::ranges::any_of(row.values, [](double v) { return v != 0; });
+  });
+}
+
+bool never_moves(const LoggedRun& run) {
+  return run.poses.size() > 1 && std::ranges::all_of(run.poses, [&](const PoseRow& row) {
+           return row.X_WM == run.poses.front().X_WM;
+         });
+}
+
+bool travels(const LoggedRun& run) {
+  std::vector<double> x, y, away_m;
+  for (const PoseRow& row : run.poses) {
+    x.push_back(row.X_WM.x);
+    y.push_back(row.X_WM.y);
+  }
+  if (x.empty()) return false;
+  const double middle_x = median(x), middle_y = median(y);
+  for (const PoseRow& row : run.poses) {
+    away_m.push_back(std::hypot(row.X_WM.x - middle_x, row.X_WM.y - middle_y));
+  }
+  return quantile(away_m, 0.9) > kMoves_m;
+}
+
+bool same_poses(const LoggedRun& a, const LoggedRun& b) {
+  return std::ranges::equal(a.poses, b.poses, {}, &PoseRow::X_WM, &PoseRow::X_WM);
+}
+
+// Where something is odd: the first place, and how many.
+struct Places {
+  std::string first;
+  std::size_t count = 0;
+
+  void add(const std::function<std::string()>& text) {
+    if (count++ == 0) first = text();
+  }
+  std::string text() const {
+    return first + (count > 1 ? " and " + std::to_string(count - 1) + " more" : "");
+  }
+};
+
+void add_useless_runs(const RunLog& log, RunChecks* checks) {
+  Places still, driverless, copies;
+  for (std::size_t r = 0; r < log.runs.size(); ++r) {
+    const LoggedRun& run = log.runs[r];
+    const auto is_copied = [&](std::size_t other) { return same_poses(run, log.runs[other]); };
+    std::size_t first = 0;
+    while (first < r && !is_copied(first)) ++first;
+    Places* of = nullptr;
+    if (never_moves(run) && is_commanded(run)) of = &still;
+    if (!is_commanded(run) && travels(run) && !log.relative) of = &driverless;
+    if (first < r && run.poses.size() > 1 && of == nullptr) of = &copies;
+    if (of == nullptr) continue;
+    of->add([&] {
+      return name_of(run) + (of == &copies ? " (" + name_of(log.runs[first]) + " again)" : "");
+    });
+    checks->useless.push_back(r);
+  }
+  const Severity severity = checks->none_is_left(log) ? Severity::kUnusable : Severity::kNote;
+  const auto report = [&](const Places& of, const char* name, const std::string& what,
+                          const char* remedy) {
+    if (of.count > 0) checks->findings.push_back({name, what + of.text() + ".", remedy, severity});
+  };
+  report(still, "still_runs", "The poses never change, though the robot is commanded to drive: ",
+         "Log these runs again: the tracker stood still. They are omitted.");
+  report(driverless, "uncommanded_runs", "Every command is 0, though the robot travels: ",
+         "Log the commands that it was driven by. These runs are omitted.");
+  report(copies, "repeated_runs",
+         "Every pose is another run's: ", "Name each run once. The copies are omitted.");
+}
+
+struct Step {
+  double length = 0;  // a usual time between poses
+  std::size_t run = 0, to = 0;
+};
+
+using Length = std::function<double(const Pose&, const Pose&)>;
+
+// Of poses that may have a gap before them; as long as usual at least.
+std::vector<double> usual_times(const LoggedRun& run) {
+  std::vector<double> apart_s;
+  for (std::size_t i = 1; i < run.poses.size(); ++i) {
+    apart_s.push_back(run.poses[i].t_s - run.poses[i - 1].t_s);
+  }
+  const double usual_s = apart_s.empty() ? 1 : std::max(median(apart_s), 1e-9);
+  std::vector<double> times = {1};
+  for (const double s : apart_s) times.push_back(std::max(1.0, s / usual_s));
+  return times;
+}
+
+struct Jumps {
+  std::vector<Step> steps;
+  double usual = 0;  // what no other step is longer than
+};
+
+// Steps that are far longer than most, and than those about them.
+Jumps jumps_of(const RunLog& log, double least, double most, const Length& length) {
+  std::vector<Step> steps;
+  std::vector<double> all;
+  for (std::size_t r = 0; r < log.runs.size(); ++r) {
+    const std::vector<PoseRow>& poses = log.runs[r].poses;
+    const std::vector<double> times = usual_times(log.runs[r]);
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+      steps.push_back({length(poses[i - 1].X_WM, poses[i].X_WM) / times[i], r, i});
+      all.push_back(steps.back().length);
+    }
+  }
+  Jumps jumps;
+  if (all.empty()) return jumps;
+  jumps.usual = std::clamp(kTimesUsualStep * quantile(all, kUsualShare), least, most);
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    if (!(steps[k].length > jumps.usual)) continue;
+    std::vector<double> about;
+    const std::size_t end = std::min(steps.size(), k + kNeighbours + 1);
+    for (std::size_t j = k - std::min(k, kNeighbours); j < end; ++j) {
+      if (j != k && steps[j].run == steps[k].run) about.push_back(steps[j].length);
+    }
+    if (about.empty()) continue;
+    if (!(steps[k].length > std::min(most, kTimesUsualStep * median(about)))) continue;
+    jumps.steps.push_back(steps[k]);
+  }
+  return jumps;
+}
+
+// The middle of the longest stretch between these steps of a run.
+std::size_t surest_pose(const std::vector<std::size_t>& cuts, std::size_t poses) {
+  std::size_t from = 0, longest = 0, middle = 0;
+  const auto end_at = [&](std::size_t end) {
+    if (end - from > longest) {
+      longest = end - from;
+      middle = from + longest / 2;
+    }
+    from = end;
+  };
+  for (const std::size_t cut : cuts) end_at(cut);
+  end_at(poses);
+  return middle;
+}
+
+// Poses that no usual step leads to from where the robot was last; where they are too many, it is
+// there from then on.
+void omit_jumps(const RunLog& log, const Jumps& jumps, const Length& length, RunChecks* checks) {
+  for (std::size_t r = 0; r < log.runs.size(); ++r) {
+    std::vector<std::size_t> cuts;
+    for (const Step& step : jumps.steps) {
+      if (step.run == r) cuts.push_back(step.to);
+    }
+    if (cuts.empty()) continue;
+    const std::vector<PoseRow>& poses = log.runs[r].poses;
+    const std::vector<double> times = usual_times(log.runs[r]);
+    const auto most = static_cast<std::size_t>(kMostLost * static_cast<double>(poses.size()));
+    const std::size_t start = surest_pose(cuts, poses.size());
+    for (const int way : {1, -1}) {
+      std::size_t last = start;
+      std::vector<std::size_t> lost;
+      const auto omit_lost = [&] {
+        for (const std::size_t i : lost) checks->false_poses.insert({r, i});
+        lost.clear();
+      };
+      for (std::size_t i = start + way; i < poses.size(); i += way) {  // below 0 it is large
+        const auto leads = [&](std::size_t from, double longer) {
+          return length(poses[from].X_WM, poses[i].X_WM) <= jumps.usual * longer;
+        };
+        // It went on while it was lost, a usual step at a time.
+        const double time = times[way > 0 ? i : i + 1];
+        const double more = static_cast<double>(lost.size()) / kTimesUsualStep;
+        if (leads(last, time + more)) {
+          // Back without a jump it had only gone on.
+          if (!lost.empty() && leads(lost.back(), time)) lost.clear();
+          omit_lost();
+          last = i;
+          continue;
+        }
+        lost.push_back(i);
+        if (lost.size() <= most) continue;
+        lost.clear();
+        last = i;
+      }
+      omit_lost();
+    }
+  }
+}
+
+void add_jumps(const RunLog& log, RunChecks* checks) {
+  if (log.relative) return;
+  const auto report = [&](double least, double most, const char* name, const char* what,
+                          const char* unit, const Length& length) {
+    const Jumps jumps = jumps_of(log, least, most, length);
+    if (jumps.steps.empty()) return;
+    const std::size_t before = checks->false_poses.size();
+    omit_jumps(log, jumps, length, checks);
+    const auto far = std::ranges::max_element(jumps.steps, {}, &Step::length);
+    const LoggedRun& run = log.runs[far->run];
+    checks->findings.push_back(
+        {name,
+         std::string(what) + " jump " + std::to_string(jumps.steps.size()) +
+             " times, the farthest by " + few_digits(far->length) + " " + unit + " at t " +
+             few_digits(run.poses[far->to].t_s) + " s of " + name_of(run) + "; " +
+             std::to_string(checks->false_poses.size() - before) +
+             " poses that no step leads to are omitted.",
+         "Leave out poses that the tracker took from elsewhere, and number what follows a lasting "
+         "jump as another run.",
+         Severity::kNote});
+  };
+  report(0, INFINITY, "pose_jumps", "Positions", "m",
+         [](const Pose& a, const Pose& b) { return std::hypot(b.x - a.x, b.y - a.y); });
+  report(kLeastTurn_rad, kMostTurn_rad, "heading_jumps", "Headings", "rad",
+         [](const Pose& a, const Pose& b) { return std::abs(wrap_angle(b.theta - a.theta)); });
+}
+
+void add_gaps(const RunLog& log, RunChecks* checks) {
+  Places gaps;
+  for (const LoggedRun& run : log.runs) {
+    std::vector<double> apart_s;
+    for (std::size_t i = 1; i < run.poses.size(); ++i) {
+      apart_s.push_back(run.poses[i].t_s - run.poses[i - 1].t_s);
+    }
+    if (apart_s.empty()) continue;
+    const double most_s = std::max(kLeastGap_s, kTimesUsualGap * median(apart_s));
+    for (std::size_t i = 0; i < apart_s.size(); ++i) {
+      if (!(apart_s[i] > most_s)) continue;
+      gaps.add([&] {
+        return "for " + few_digits(apart_s[i]) + " s from t " + few_digits(run.poses[i].t_s) +
+               " s of " + name_of(run);
+      });
+    }
+  }
+  if (gaps.count == 0) return;
+  checks->findings.push_back({"pose_gaps", "There is no pose " + gaps.text() + ".",
+                              "Number what follows a gap as another run.", Severity::kNote});
+}
+
+}  // namespace
+
+RunChecks check_runs(const RunLog& log) {
+  RunChecks checks;
+  add_useless_runs(log, &checks);
+  add_jumps(log, &checks);
+  add_gaps(log, &checks);
+  return checks;
+}
+
+RunLog useful_runs(RunLog log, const RunChecks& checks) {
+  for (auto pose = checks.false_poses.rbegin(); pose != checks.false_poses.rend(); ++pose) {
+    std::vector<PoseRow>& poses = log.runs[pose->first].poses;
+    poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(pose->second));
+  }
+  for (auto r = checks.useless.rbegin(); r != checks.useless.rend(); ++r) {
+    log.runs.erase(log.runs.begin() + static_cast<std::ptrdiff_t>(*r));
+  }
+  return log;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,33 @@
+// What is wrong with logged runs of any ground robot.
+#pragma once
+
+#include <cstddef>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "common/recordings/run.h"
+#include "master/io/log_checks/finding.h"
+
+namespace gapfarm {
+
+struct RunChecks {
+  std::vector<SanityFinding> findings;
+  // Which say nothing of how commands move a robot, or what another has said: ascending.
+  std::vector<std::size_t> useless;
+  std::set<std::pair<std::size_t, std::size_t>> false_poses = {};  // of which run, which
+
+  bool none_is_left(const RunLog& log) const {
+    return !useless.empty() && useless.size() == log.runs.size();
+  }
+};
+
+// Runs whose poses never change though it is commanded to drive, that move though nothing is
+// commanded, and that are another one's copy; poses that the tracker took from elsewhere, for they
+// jump there and back; stretches without any.
+RunChecks check_runs(const RunLog& log);
+
+// Without those.
+RunLog useful_runs(RunLog log, const RunChecks& checks);
+
+}  // namespace gapfarm

@@ -1,0 +1,130 @@
+#include "master/io/log_checks/run_checks.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "common/base/ranges.h"
+#include "common/pose/pose.h"
+#include "common/random/stream.h"
+
+namespace gapfarm {
+namespace {
+
+using FalsePoses = std::set<std::pair<std::size_t, std::size_t>>;
+
+// Two runs of 30 s at 10 Hz under a tracker that is off by 2 mm, standing at first.
+RunLog two_runs(Pose X_WO = {}) {
+  RunLog log;
+  log.channels = {"v", "w"};
+  Stream stream({.run_seed = 7});
+  for (const char* name : {"1", "2"}) {
+    LoggedRun& run = log.runs.emplace_back();
+    run.run = name;
+    run.commands = {{0, {0, 0}}, {3, {0.4, 0.3}}, {15, {0.3, -1.2}}};
+    Pose X = X_WO;
+    for (int k = 0; k < 300; ++k) {
+      const double t = 0.1 * k;
+      const Twist step = t < 3    ? Twist::Zero()
+                         : t < 15 ? Twist(0.04, 0, 0.03)
+                                  : Twist(0.03, 0, -0.12);
+      X = X * exp(step);
+      const Pose read = {X.x + 0.002 * stream.normal(), X.y + 0.002 * stream.normal(), X.theta};
+      run.poses.push_back({t, read});
+    }
+  }
+  return log;
+}
+
+std::vector<std::string> names_of(const RunChecks& checks) {
+  return mapped(checks.findings, &SanityFinding::name);
+}
+
+TEST(RunChecks, ASoundLogPasses) {
+  for (const Pose& origin : {Pose{}, Pose{5.4e5, 5.2e6, 3}}) {
+    const RunChecks checks = check_runs(two_runs(origin));
+    EXPECT_TRUE(checks.findings.empty()) << checks.findings.front().text;
+    EXPECT_TRUE(checks.false_poses.empty());
+  }
+}
+
+TEST(RunChecks, RunsThatSayNothingAreOmitted) {
+  RunLog log = two_runs();
+  for (PoseRow& row : log.runs[0].poses) row.X_WM = {1, 2, 3};
+  for (CommandRow& row : log.runs[1].commands) row.values = {0, 0};
+  log.runs.push_back(two_runs().runs[1]);
+  log.runs.push_back(log.runs[2]);
+  const RunChecks checks = check_runs(log);
+  EXPECT_EQ(names_of(checks),
+            (std::vector<std::string>{"still_runs", "uncommanded_runs", "repeated_runs"}));
+  // The third has the poses of the second, whose commands are gone.
+  EXPECT_EQ(checks.useless, (std::vector<std::size_t>{0, 1, 2, 3}));
+  EXPECT_TRUE(checks.none_is_left(log));
+  EXPECT_TRUE(any_unusable(checks.findings));
+}
+
+TEST(RunChecks, ARobotThatStandsByCommandIsNoMistake) {
+  RunLog log = two_runs();
+  for (CommandRow& row : log.runs[0].commands) row.values = {0, 0};
+  for (PoseRow& row : log.runs[0].poses) row.X_WM = {1, 2, 3};
+  EXPECT_TRUE(check_runs(log).findings.empty());
+}
+
+TEST(RunChecks, PosesFromElsewhereAreOmitted) {
+  for (const Pose& origin : {Pose{3, -4, 0}, Pose{5.4e5, 5.2e6, 3}}) {
+    RunLog log = two_runs(origin);
+    FalsePoses lost;
+    const auto lose = [&](std::size_t run, std::size_t from, std::size_t count) {
+      for (std::size_t i = from; i < from + count; ++i) {
+        log.runs[run].poses[i].X_WM = {};
+        lost.insert({run, i});
+      }
+    };
+    lose(0, 0, 7);
+    lose(0, 100, 20);
+    lose(1, 50, 1);
+    lose(1, 280, 20);
+    const RunChecks checks = check_runs(log);
+    EXPECT_EQ(checks.false_poses, lost);
+    EXPECT_EQ(useful_runs(log, checks).runs[0].poses.size(), 273U);
+    EXPECT_TRUE(checks.useless.empty());
+  }
+}
+
+TEST(RunChecks, HeadingsThatFlipAreOmitted) {
+  RunLog log = two_runs();
+  FalsePoses flipped;
+  for (std::size_t i = 12; i < 300; i += 17) {
+    Pose& X = log.runs[1].poses[i].X_WM;
+    X.theta = wrap_angle(X.theta + std::numbers::pi);
+    flipped.insert({1, i});
+  }
+  const RunChecks checks = check_runs(log);
+  EXPECT_EQ(names_of(checks), std::vector<std::string>{"heading_jumps"});
+  EXPECT_EQ(checks.false_poses, flipped);
+}
+
+TEST(RunChecks, AfterALastingJumpTheRunGoesOn) {
+  RunLog log = two_runs();
+  for (std::size_t i = 180; i < 300; ++i) log.runs[0].poses[i].X_WM.x += 2;
+  const RunChecks checks = check_runs(log);
+  EXPECT_EQ(names_of(checks), std::vector<std::string>{"pose_jumps"});
+  EXPECT_TRUE(checks.false_poses.empty());
+}
+
+TEST(RunChecks, AGapInTimeIsNoJump) {
+  RunLog log = two_runs();
+  std::vector<PoseRow>& poses = log.runs[0].poses;
+  for (std::size_t i = 200; i < 300; ++i) poses[i].t_s += 3600;
+  poses.erase(poses.begin() + 40, poses.begin() + 80);
+  const RunChecks checks = check_runs(log);
+  EXPECT_EQ(names_of(checks), std::vector<std::string>{"pose_gaps"});
+  EXPECT_NE(checks.findings[0].text.find("of run 1"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace gapfarm
