@@ -89,6 +89,13 @@ double share_on_grid(const std::vector<double>& values, double step, double tole
   return on / static_cast<double>(values.size());
 }
 
+// On how many lines of a grid through the first they lie.
+std::size_t lines_of(const std::vector<double>& values, double step) {
+  std::set<long> lines;
+  for (const double v : values) lines.insert(std::lround((v - values.front()) / step));
+  return lines.size();
+}
+
 // The widest grid that holds the readings, 0 if none.
 double grid_of(const std::vector<double>& readings, const std::vector<double>& values) {
   std::vector<double> differences;
@@ -106,6 +113,8 @@ double grid_of(const std::vector<double>& readings, const std::vector<double>& v
     if (kLeastDistinctOnGrid * static_cast<double>(values.size()) > most) continue;
     const double step = refined(likely, differences, range);
     if (step <= kLeastStep * (1 + 1e-6) || step <= widest) continue;
+    // Values in two heaps lie on a grid of two lines, whatever they are.
+    if (lines_of(values, step) < kLeastDistinct) continue;
     const double tolerance = std::max(kDigits, kOffGrid * step);
     if (share_on_grid(values, step, tolerance) < kLeastDistinctOnGrid) continue;
     if (share_on_grid(readings, step, tolerance) >= kLeastOnGrid) widest = step;

@@ -12,7 +12,6 @@
 #include "master/ground/reference.h"
 #include "master/ground/report/ground_report.h"
 #include "master/ground/tolerances.h"
-#include "master/io/log_checks/run_checks.h"
 
 namespace gapfarm {
 namespace {
@@ -116,7 +115,7 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
     return Error{joined(checks.findings, " ",
                         [](const SanityFinding& f) { return f.text + " " + f.remedy; })};
   }
-  const RunLog log = useful_runs(logged, checks);
+  const RunLog log = without(logged, checks);
   auto result = guarded([&]() -> Result<GroundDiagnosis> {
     const RunLog* reference = options.reference ? &*options.reference : nullptr;
     const bool measured = has_wheel_speeds(robot, log) &&
@@ -166,7 +165,10 @@ std::vector<SanityFinding> wrong_way_round(const GroundRobot& robot, const RunLo
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
   RunChecks checks = check_runs(log);
   if (checks.none_is_left(log)) return checks.findings;
-  std::vector<SanityFinding> findings = wrong_way_round(robot, useful_runs(log, checks));
+  const RunLog useful = without(log, checks);
+  std::vector<SanityFinding> findings = wrong_way_round(robot, useful);
+  // Headings in degrees jump wherever the robot turns.
+  if (findings.empty()) findings = check_jumps(useful).findings;
   findings.insert(findings.end(), checks.findings.begin(), checks.findings.end());
   return findings;
 }

@@ -129,6 +129,13 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
     search->faults.push_back(*fault);
     search->log = std::move(fault->log);
   }
+  search->jumps = check_jumps(search->log);
+  if (!search->jumps.false_poses.empty()) {
+    search->log = without(std::move(search->log), search->jumps);
+    ASSIGN_OR_RETURN(search->windows, question.windows(robot, search->log, work.windows));
+    search->fit =
+        WindowFitter(robot, search->windows, question.reference, work.memo).fit(search->rows);
+  }
   if (!search->windows.noise.empty()) {
     const WindowFitter as_stated(robot, search->windows, question.reference, work.memo);
     search->windows.least_noise = as_stated.likeliest_least_noise(search->fit);

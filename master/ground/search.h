@@ -18,6 +18,7 @@
 #include "master/ground/fit/wheel_loop.h"
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/hypotheses.h"
+#include "master/io/log_checks/run_checks.h"
 
 namespace gapfarm {
 
@@ -89,6 +90,7 @@ struct GroundSearch : GroundBasis {
   std::optional<WheelLoop> loop;  // where speeds were measured beside commands
   PoseGrid grid;                  // that the poses are rounded to
   StaleFrames stale;              // taken out of `log`
+  RunChecks jumps;                // the same
   RunLog log;
   WindowSet windows;                       // of that log
   std::vector<std::vector<Offer>> offers;  // of each step, best first

@@ -135,6 +135,7 @@ void GroundReport::faults() {
 
 // What the poses show by themselves.
 void GroundReport::readings() {
+  d_.sanity.insert(d_.sanity.end(), search_.jumps.findings.begin(), search_.jumps.findings.end());
   const auto add = [&](const char* name, std::vector<std::string> aliases, Estimate estimate,
                        std::string text, const char* remedy) {
     NamedEffect effect;

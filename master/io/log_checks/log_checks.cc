@@ -1,12 +1,16 @@
 #include "master/io/log_checks/log_checks.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <set>
 #include <tuple>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/math/statistics.h"
 #include "common/trials/pose_readings.h"
 #include "master/io/log_checks/sanity.h"
 
@@ -22,8 +26,42 @@ constexpr std::array<LengthUnit, 5> kUnits = {{{"millimetres", 0.001},
                                                {"feet", 0.3048},
                                                {"kilometres", 1000}}};
 
+// Of two heaps of lengths in two units.
+constexpr std::ptrdiff_t kFewestOfAUnit = 5;
+constexpr double kTimesBetween = 3;  // the shortest of one over the longest of the other
+constexpr double kNearAUnit = 1.5;   // the ratio of their medians over that of two units
+constexpr double kNearInPlaces = 3;  // and of how far apart they end
+
 std::string row_text(const Trial& trial) {
   return "session " + trial.session + ", trial " + std::to_string(trial.trial);
+}
+
+// How far they end from their middle, half of them.
+double spread_of_ends(const TrialLog& log, std::span<const TrialLength> these) {
+  std::vector<double> x, y, away;
+  for (const TrialLength& t : these) {
+    x.push_back(log.trials[t.trial].X_WE.x);
+    y.push_back(log.trials[t.trial].X_WE.y);
+  }
+  const double middle_x = median(x), middle_y = median(y);
+  for (const TrialLength& t : these) {
+    const Pose& X = log.trials[t.trial].X_WE;
+    away.push_back(std::hypot(X.x - middle_x, X.y - middle_y));
+  }
+  return median(away);
+}
+
+// "session s3", or which trials these are.
+std::string place_of(const TrialLog& log, std::span<const TrialLength> these,
+                     std::span<const TrialLength> others) {
+  std::set<std::string> sessions, of_others;
+  for (const TrialLength& t : these) sessions.insert(log.trials[t.trial].session);
+  for (const TrialLength& t : others) of_others.insert(log.trials[t.trial].session);
+  const bool apart = std::ranges::none_of(
+      sessions, [&](const std::string& session) { return of_others.contains(session); });
+  if (apart) return "session " + joined(sessions, ", ") + " alone";
+  const auto first = std::ranges::min_element(these, {}, &TrialLength::trial);
+  return "the first is " + row_text(log.trials[first->trial]);
 }
 
 }  // namespace
@@ -42,6 +80,34 @@ const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, dou
     if (far < least) least = far, best = &unit;
   }
   return best;
+}
+
+bool check_mixed_units(const TrialLog& log, std::vector<TrialLength> lengths, const char* trials,
+                       const char* columns, std::vector<SanityFinding>* findings) {
+  std::ranges::sort(lengths, {}, &TrialLength::length);
+  const auto count = static_cast<std::ptrdiff_t>(lengths.size());
+  std::ptrdiff_t cut = 0;
+  double between = kTimesBetween;
+  for (std::ptrdiff_t k = kFewestOfAUnit; k + kFewestOfAUnit <= count; ++k) {
+    const double times = lengths[k].length / lengths[k - 1].length;
+    if (times > between) between = times, cut = k;
+  }
+  if (cut == 0) return false;
+  const std::span<const TrialLength> metric(lengths.data(), cut),
+      others(lengths.data() + cut, count - cut);
+  const double times = others[others.size() / 2].length / metric[metric.size() / 2].length;
+  const LengthUnit* unit = likely_unit(times, 1 / kNearAUnit, kNearAUnit, 1);
+  // What goes far by another command ends where the others do.
+  const double apart = spread_of_ends(log, others) / spread_of_ends(log, metric) / times;
+  if (unit == nullptr || !(apart > 1 / kNearInPlaces && apart < kNearInPlaces)) return false;
+  findings->push_back({"unit_error",
+                       std::to_string(others.size()) + " of " + std::to_string(count) + " " +
+                           trials + " go " + formatted("%.0f", times) +
+                           " times as far as the rest, as if they were in " + unit->name + " (" +
+                           place_of(log, others, metric) + ").",
+                       std::string("Multiply ") + columns + " of such rows, and of no others, by " +
+                           few_digits(unit->metres) + "."});
+  return true;
 }
 
 void check_count(const TrialLog& log, std::vector<SanityFinding>* findings) {

@@ -18,6 +18,16 @@ void check_headings(const TrialLog& log, std::vector<SanityFinding>* findings);
 // Times that run backward within a session.
 void check_clock(const TrialLog& log, std::vector<SanityFinding>* findings);
 
+// Of a trial, how far something went in it.
+struct TrialLength {
+  std::size_t trial = 0;
+  double length = 0;  // above 0
+};
+// Whether some trials are in another unit than the others: their lengths fall into two heaps that
+// lie as far apart as two units do.
+bool check_mixed_units(const TrialLog& log, std::vector<TrialLength> lengths, const char* trials,
+                       const char* columns, std::vector<SanityFinding>* findings);
+
 // "3.1 %", "0.25": few digits, no trailing zeros.
 std::string few_digits(double value);
 

@@ -176,6 +176,19 @@ void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) 
     return;
   }
   if (distances.empty()) return;
+  std::vector<TrialLength> ways;
+  for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
+    const std::vector<TipSample>& tip = problem.log.trials[i].tip;
+    double way = 0;
+    for (std::size_t k = 1; k < tip.size(); ++k) {
+      way += std::hypot(tip[k].x - tip[k - 1].x, tip[k].y - tip[k - 1].y);
+    }
+    if (way > 0) ways.push_back({i, way});
+  }
+  if (check_mixed_units(problem.log, std::move(ways), "pushes",
+                        "the finger's and the piece's x and y", findings)) {
+    return;
+  }
   const double nearest = median(distances), reach = median(reaches);
   auto outlines = check_outlines(problem, reach);
   const bool near = nearest < kFar * reach;

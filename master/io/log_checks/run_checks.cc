@@ -19,10 +19,11 @@ constexpr double kLeastGap_s = 10;  // twice the longest windows
 constexpr double kTimesUsualGap = 50;
 // Of a step over the commonest and over those about it: no robot gathers speed so fast.
 constexpr double kTimesUsualStep = 20;
-constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;  // more is no step of a heading
-constexpr std::size_t kNeighbours = 4;                        // either way
-constexpr double kUsualShare = 0.8;  // of the steps are shorter: a tracker may lose some
-constexpr double kMostLost = 0.1;    // of a run, before the tracker found the robot
+constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;
+constexpr double kTimesAStep = 3;       // where half a turn is no more than a few of them
+constexpr std::size_t kNeighbours = 4;  // either way
+constexpr double kUsualShare = 0.8;     // of the steps are shorter: a tracker may lose some
+constexpr double kMostLost = 0.1;       // of a run, before the tracker found the robot
 
 std::string name_of(const LoggedRun& run) { return "run " + run.run; }
 
@@ -137,7 +138,10 @@ Jumps jumps_of(const RunLog& log, double least, double most, const Length& lengt
   }
   Jumps jumps;
   if (all.empty()) return jumps;
-  jumps.usual = std::clamp(kTimesUsualStep * quantile(all, kUsualShare), least, most);
+  const auto limit = [&](double about) {
+    return std::min(kTimesUsualStep * about, std::max(most, kTimesAStep * about));
+  };
+  jumps.usual = std::max(least, limit(quantile(all, kUsualShare)));
   for (std::size_t k = 0; k < steps.size(); ++k) {
     if (!(steps[k].length > jumps.usual)) continue;
     std::vector<double> about;
@@ -146,7 +150,7 @@ Jumps jumps_of(const RunLog& log, double least, double most, const Length& lengt
       if (j != k && steps[j].run == steps[k].run) about.push_back(steps[j].length);
     }
     if (about.empty()) continue;
-    if (!(steps[k].length > std::min(most, kTimesUsualStep * median(about)))) continue;
+    if (!(steps[k].length > limit(median(about)))) continue;
     jumps.steps.push_back(steps[k]);
   }
   return jumps;
@@ -211,33 +215,6 @@ void omit_jumps(const RunLog& log, const Jumps& jumps, const Length& length, Run
   }
 }
 
-void add_jumps(const RunLog& log, RunChecks* checks) {
-  if (log.relative) return;
-  const auto report = [&](double least, double most, const char* name, const char* what,
-                          const char* unit, const Length& length) {
-    const Jumps jumps = jumps_of(log, least, most, length);
-    if (jumps.steps.empty()) return;
-    const std::size_t before = checks->false_poses.size();
-    omit_jumps(log, jumps, length, checks);
-    const auto far = std::ranges::max_element(jumps.steps, {}, &Step::length);
-    const LoggedRun& run = log.runs[far->run];
-    checks->findings.push_back(
-        {name,
-         std::string(what) + " jump " + std::to_string(jumps.steps.size()) +
-             " times, the farthest by " + few_digits(far->length) + " " + unit + " at t " +
-             few_digits(run.poses[far->to].t_s) + " s of " + name_of(run) + "; " +
-             std::to_string(checks->false_poses.size() - before) +
-             " poses that no step leads to are omitted.",
-         "Leave out poses that the tracker took from elsewhere, and number what follows a lasting "
-         "jump as another run.",
-         Severity::kNote});
-  };
-  report(0, INFINITY, "pose_jumps", "Positions", "m",
-         [](const Pose& a, const Pose& b) { return std::hypot(b.x - a.x, b.y - a.y); });
-  report(kLeastTurn_rad, kMostTurn_rad, "heading_jumps", "Headings", "rad",
-         [](const Pose& a, const Pose& b) { return std::abs(wrap_angle(b.theta - a.theta)); });
-}
-
 void add_gaps(const RunLog& log, RunChecks* checks) {
   Places gaps;
   for (const LoggedRun& run : log.runs) {
@@ -265,12 +242,40 @@ void add_gaps(const RunLog& log, RunChecks* checks) {
 RunChecks check_runs(const RunLog& log) {
   RunChecks checks;
   add_useless_runs(log, &checks);
-  add_jumps(log, &checks);
   add_gaps(log, &checks);
   return checks;
 }
 
-RunLog useful_runs(RunLog log, const RunChecks& checks) {
+RunChecks check_jumps(const RunLog& log) {
+  RunChecks checks;
+  if (log.relative) return checks;
+  const auto report = [&](double least, double most, const char* name, const char* what,
+                          const char* unit, const Length& length) {
+    const Jumps jumps = jumps_of(log, least, most, length);
+    if (jumps.steps.empty()) return;
+    const std::size_t before = checks.false_poses.size();
+    omit_jumps(log, jumps, length, &checks);
+    const auto far = std::ranges::max_element(jumps.steps, {}, &Step::length);
+    const LoggedRun& run = log.runs[far->run];
+    checks.findings.push_back(
+        {name,
+         std::string(what) + " jump " + std::to_string(jumps.steps.size()) +
+             " times, the farthest by " + few_digits(far->length) + " " + unit + " at t " +
+             few_digits(run.poses[far->to].t_s) + " s of " + name_of(run) + "; " +
+             std::to_string(checks.false_poses.size() - before) +
+             " poses that no step leads to are omitted.",
+         "Leave out poses that the tracker took from elsewhere, and number what follows a lasting "
+         "jump as another run.",
+         Severity::kNote});
+  };
+  report(0, INFINITY, "pose_jumps", "Positions", "m",
+         [](const Pose& a, const Pose& b) { return std::hypot(b.x - a.x, b.y - a.y); });
+  report(kLeastTurn_rad, kMostTurn_rad, "heading_jumps", "Headings", "rad",
+         [](const Pose& a, const Pose& b) { return std::abs(wrap_angle(b.theta - a.theta)); });
+  return checks;
+}
+
+RunLog without(RunLog log, const RunChecks& checks) {
   for (auto pose = checks.false_poses.rbegin(); pose != checks.false_poses.rend(); ++pose) {
     std::vector<PoseRow>& poses = log.runs[pose->first].poses;
     poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(pose->second));

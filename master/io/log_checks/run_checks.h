@@ -22,12 +22,15 @@ struct RunChecks {
   }
 };
 
-// Runs whose poses never change though it is commanded to drive, that move though nothing is
-// commanded, and that are another one's copy; poses that the tracker took from elsewhere, for they
-// jump there and back; stretches without any.
+// Runs whose poses never change though the robot is commanded to drive, that move though nothing is
+// commanded, and that are another one's copy; stretches without any pose.
 RunChecks check_runs(const RunLog& log);
 
-// Without those.
-RunLog useful_runs(RunLog log, const RunChecks& checks);
+// Poses that the tracker took from elsewhere, for they jump there and back.  REQUIRES: headings in
+// radians.
+RunChecks check_jumps(const RunLog& log);
+
+// Without what these found.
+RunLog without(RunLog log, const RunChecks& checks);
 
 }  // namespace gapfarm

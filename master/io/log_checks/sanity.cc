@@ -81,6 +81,13 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
   const std::vector<DriveSample> samples = drive_samples(problem);
   const DriveLimits limits = limits_of(problem);
   if (check_motion(samples, limits, findings)) return;
+  std::vector<TrialLength> speeds;
+  for (const DriveSample& s : straight_samples(samples)) {
+    if (s.distance_m() > 0) speeds.push_back({s.trial, s.distance_m() / std::abs(s.forward_s)});
+  }
+  if (check_mixed_units(problem.log, std::move(speeds), "straight drives", "x0, y0, x1 and y1",
+                        findings))
+    return;
   bool suspicious = check_speed(samples, limits, findings);
   if (check_heading_unit(samples, findings)) {
     suspicious = true;

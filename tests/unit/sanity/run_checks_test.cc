@@ -46,9 +46,10 @@ std::vector<std::string> names_of(const RunChecks& checks) {
 
 TEST(RunChecks, ASoundLogPasses) {
   for (const Pose& origin : {Pose{}, Pose{5.4e5, 5.2e6, 3}}) {
-    const RunChecks checks = check_runs(two_runs(origin));
-    EXPECT_TRUE(checks.findings.empty()) << checks.findings.front().text;
-    EXPECT_TRUE(checks.false_poses.empty());
+    for (const RunChecks& checks : {check_runs(two_runs(origin)), check_jumps(two_runs(origin))}) {
+      EXPECT_TRUE(checks.findings.empty()) << checks.findings.front().text;
+      EXPECT_TRUE(checks.false_poses.empty());
+    }
   }
 }
 
@@ -88,9 +89,9 @@ TEST(RunChecks, PosesFromElsewhereAreOmitted) {
     lose(0, 100, 20);
     lose(1, 50, 1);
     lose(1, 280, 20);
-    const RunChecks checks = check_runs(log);
+    const RunChecks checks = check_jumps(log);
     EXPECT_EQ(checks.false_poses, lost);
-    EXPECT_EQ(useful_runs(log, checks).runs[0].poses.size(), 273U);
+    EXPECT_EQ(without(log, checks).runs[0].poses.size(), 273U);
     EXPECT_TRUE(checks.useless.empty());
   }
 }
@@ -103,7 +104,7 @@ TEST(RunChecks, HeadingsThatFlipAreOmitted) {
     X.theta = wrap_angle(X.theta + std::numbers::pi);
     flipped.insert({1, i});
   }
-  const RunChecks checks = check_runs(log);
+  const RunChecks checks = check_jumps(log);
   EXPECT_EQ(names_of(checks), std::vector<std::string>{"heading_jumps"});
   EXPECT_EQ(checks.false_poses, flipped);
 }
@@ -111,7 +112,7 @@ TEST(RunChecks, HeadingsThatFlipAreOmitted) {
 TEST(RunChecks, AfterALastingJumpTheRunGoesOn) {
   RunLog log = two_runs();
   for (std::size_t i = 180; i < 300; ++i) log.runs[0].poses[i].X_WM.x += 2;
-  const RunChecks checks = check_runs(log);
+  const RunChecks checks = check_jumps(log);
   EXPECT_EQ(names_of(checks), std::vector<std::string>{"pose_jumps"});
   EXPECT_TRUE(checks.false_poses.empty());
 }
@@ -123,6 +124,7 @@ TEST(RunChecks, AGapInTimeIsNoJump) {
   poses.erase(poses.begin() + 40, poses.begin() + 80);
   const RunChecks checks = check_runs(log);
   EXPECT_EQ(names_of(checks), std::vector<std::string>{"pose_gaps"});
+  EXPECT_TRUE(check_jumps(log).findings.empty());
   EXPECT_NE(checks.findings[0].text.find("of run 1"), std::string::npos);
 }
 

@@ -162,6 +162,37 @@ TEST(Sanity, NamesWhatIsTheWrongWayRound) {
   }
 }
 
+TEST(Sanity, ReportsWhichRowsAreInAnotherUnit) {
+  const struct {
+    double times;
+    const char* unit;
+    std::function<bool(const Trial&, std::size_t)> is_in_it;
+    const char* where;
+  } cases[] = {
+      {1000, "millimetres", [](const Trial& t, std::size_t) { return t.session == "s2"; },
+       "session s2 alone"},
+      {100, "centimetres", [](const Trial&, std::size_t i) { return i >= 60; }, "the first is"},
+      {1 / 0.0254, "inches", [](const Trial&, std::size_t i) { return i % 3 != 0; },
+       "the first is"},
+      {1000, "millimetres", [](const Trial&, std::size_t i) { return i % 2 == 0; },
+       "the first is"}};
+  for (const auto& c : cases) {
+    Problem problem = drawn_drives(150);
+    for (std::size_t i = 0; i < 150; ++i) {
+      Trial& t = problem.log.trials[i];
+      if (!c.is_in_it(t, i)) continue;
+      for (Pose* X : {&t.X_WS, &t.X_WE}) *X = {c.times * X->x, c.times * X->y, X->theta};
+    }
+    const auto findings = check_sanity(problem);
+    ASSERT_FALSE(findings.empty());
+    EXPECT_EQ(findings[0].name, "unit_error");
+    EXPECT_EQ(findings[0].severity, Severity::kUnusable);
+    EXPECT_NE(findings[0].text.find(c.unit), std::string::npos) << findings[0].text;
+    EXPECT_NE(findings[0].text.find(c.where), std::string::npos) << findings[0].text;
+    EXPECT_NE(findings[0].remedy.find("of no others"), std::string::npos);
+  }
+}
+
 TEST(Sanity, ReportsWhichUnitAndWhichAxis) {
   const Problem log = drawn_drives(150);
   const auto text_of = [](const Problem& problem) {

@@ -114,4 +114,14 @@ TEST(StaleFrames, AreNoneOfSoundTracksOfRestingRobotsAndOfCoarseDigits) {
   EXPECT_EQ(count_stale({}, 0).share, 0);
 }
 
+// Of ten drives ahead and back: the first run of real forward drives.
+TEST(PoseGrid, TwoHeapsOfHeadingsAreNoGrid) {
+  std::vector<Pose> poses;
+  for (const double theta :
+       {-1.23412, -1.21781, -1.19029, -1.17227, 1.10715, 1.12842, 1.14794, 1.19029}) {
+    poses.push_back({0, 0, theta});
+  }
+  EXPECT_EQ(pose_grid(poses).heading_step_rad, 0);
+}
+
 }  // namespace gapfarm::pose_readings_test
