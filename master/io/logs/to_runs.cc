@@ -54,7 +54,9 @@ class Importer {
       for (const Kind& kind : kinds()) RETURN_IF_ERROR(take(i, kind));
     }
     for (const Kind& kind : {kinds()[0], kinds()[1]}) {
-      if (!kind.map->columns.empty() && tallies_[kind.name].taken == 0) return none_found(kind);
+      const Tally& tally = tallies_[kind.name];
+      if (!kind.map->columns.empty() && tally.taken == 0) return none_found(kind);
+      if (tally.back > tally.taken) return out_of_order(kind, tally);
     }
     assemble();
     for (const LoggedRun& logged : out_.log.runs) {
@@ -66,6 +68,14 @@ class Importer {
   }
 
  private:
+  // Several runs, or rows in no order.
+  Error out_of_order(const Kind& kind, const Tally& tally) const {
+    return Error{recordings_.front().file + ": found " + std::to_string(tally.back) + " of " +
+                 std::to_string(tally.back + tally.taken) + " rows of " + kind.name +
+                 " at times before the row above, expected the order of time; sort them, or name "
+                 "runs apart by a column and write run = \"COLUMN\" in the map"};
+  }
+
   std::vector<Kind> kinds() const {
     return {{"poses", &map_.poses},
             {"commands", &map_.commands},
@@ -222,18 +232,15 @@ class Importer {
   }
 
   void put(Tally& tally, Stretch& stretch, std::vector<double> values) {
-    const double t = t_of(values);
-    if (!stretch.t_s.empty() && t < stretch.t_s.back()) {
+    if (!stretch.t_s.empty() && values.front() < stretch.t_s.back()) {
       ++tally.back;
       return;
     }
-    values.erase(values.begin() + static_cast<std::ptrdiff_t>(time_index_));
-    stretch.t_s.push_back(t);
+    stretch.t_s.push_back(values.front());
+    values.erase(values.begin());
     stretch.rows.push_back(std::move(values));
     ++tally.taken;
   }
-
-  double t_of(const std::vector<double>& values) const { return values[time_index_]; }
 
   // Recordings that have both kinds are drives of their own; others are put together in order.
   std::vector<std::vector<std::size_t>> groups() {
@@ -347,28 +354,23 @@ class Importer {
     for (const Kind& kind : kinds()) {
       if (kind.map->columns.empty()) continue;
       const Tally& tally = tallies_[kind.name];
-      std::string line = "took: " + std::to_string(tally.taken) + " " + kind.name;
-      if (!kind.map->source.empty()) line += " of " + kind.map->source;
+      const std::string source = kind.map->source.empty() ? "" : " of " + kind.map->source;
       out_.report.push_back(
-          line + " (" +
+          "took: " + std::to_string(tally.taken) + " " + kind.name + source + " (" +
           joined(kind.map->columns, ", ", [](const MappedColumn& c) { return c.column; }) + ")");
-      if (tally.dropped > 0) {
-        out_.report.push_back("left: " + std::to_string(tally.dropped) + " rows of " + kind.name +
-                              " where " + kind.map->keep + " is 0");
-      }
-      if (tally.blank > 0) {
-        out_.report.push_back("left: " + std::to_string(tally.blank) + " rows of " + kind.name +
-                              " without all their numbers");
-      }
-      if (tally.back > 0) {
-        out_.report.push_back("left: " + std::to_string(tally.back) + " rows of " + kind.name +
-                              " whose time goes back");
+      const std::pair<std::size_t, std::string> omitted[] = {
+          {tally.dropped, " where " + kind.map->keep + " is 0"},
+          {tally.blank, " without all their numbers"},
+          {tally.back, " whose time goes back"}};
+      for (const auto& [n, why] : omitted) {
+        if (n > 0)
+          out_.report.push_back("omitted: " + std::to_string(n) + " rows of " + kind.name + why);
       }
     }
     for (const Recording& recording : recordings_) {
       for (const LogTable& table : recording.tables) {
         if (used_.count(table.source) != 0) continue;
-        out_.report.push_back("left: " + table.source + " (" + table.type + ", " +
+        out_.report.push_back("omitted: " + table.source + " (" + table.type + ", " +
                               std::to_string(table.rows()) + " rows)");
       }
       for (const std::string& note : recording.notes) out_.report.push_back(note);
@@ -377,7 +379,6 @@ class Importer {
 
   const std::vector<Recording>& recordings_;
   const LogMap& map_;
-  const std::size_t time_index_ = 0;
   std::map<std::string, std::map<std::size_t, Stretches>> stretches_;  // by kind and recording
   std::map<std::string, Tally> tallies_;
   std::set<std::string> used_;

@@ -223,4 +223,20 @@ TEST(Tables, WheelSpeedsAreReadBesideCommands) {
   EXPECT_FALSE(read_wheel_speeds(folder + "/wheels.csv", &*log));
 }
 
+// Times that begin anew: one run would keep a part of them.
+TEST(Tables, RowsInNoOrderAreRefused) {
+  const auto map = parse_map(
+      "[poses]\nt = \"t\"\nx = \"x\"\ny = \"y\"\ntheta = \"a\"\n[commands]\nt = \"t\"\nleft = "
+      "\"l\"\nright = \"r\"\n",
+      "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  const std::string head = "t,x,y,a,l,r\n",
+                    run = "0,0,0,0,1,1\n1,1,0,0,1,1\n2,2,0,0,1,1\n3,3,0,0,1,1\n4,4,0,0,1,1\n";
+  EXPECT_TRUE(to_runs({table_of(head + run + "3.5,2,0,0,1,1\n")}, *map));
+  const auto refused = to_runs({table_of(head + run + run + run)}, *map);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, StartsWith("f.csv: found 8 of 15 rows of poses at times"));
+  EXPECT_THAT(refused.error().message, HasSubstr("run = \"COLUMN\""));
+}
+
 }  // namespace gapfarm::tables_test
