@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cassert>
 #include <cerrno>
+#include <cstdlib>
 #include <iostream>
 
 #include "common/base/build_info.h"
@@ -74,6 +75,22 @@ void declare_json(CLI::App& app, bool* json) {
   if (inner.empty()) app.add_flag("--json", *json, "Print results, or the error, as JSON");
 }
 
+// CLI11 takes -1 for the greatest number that there is, and what is greater for it, too.
+void refuse_wrapped_numbers(CLI::App& app) {
+  for (CLI::App* sub : app.get_subcommands({})) refuse_wrapped_numbers(*sub);
+  for (CLI::Option* option : app.get_options()) {
+    if (!option->get_type_name().starts_with("UINT")) continue;
+    option->check(CLI::Validator(
+        [](const std::string& text) -> std::string {
+          errno = 0;
+          std::strtoull(text.c_str(), nullptr, 10);
+          if (!text.starts_with("-") && errno != ERANGE) return {};
+          return "Value " + text + " not in range 0 to 18446744073709551615";
+        },
+        ""));
+  }
+}
+
 bool is_option(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
 
 // What `word` may have meant: an option of `app`, or one of its subcommands.
@@ -138,6 +155,7 @@ std::unique_ptr<Program> make_program() {
     CLI::App* sub = app.add_subcommand(row.name, row.summary)->group(row.group);
     program->runs.push_back(row.setup(*sub));
     declare_json(*sub, &program->json);
+    refuse_wrapped_numbers(*sub);
   }
   return program;
 }

@@ -47,6 +47,10 @@ TEST_F(Overwrite, NoCommandTakesAMeasuredFile) {
   const std::string read = "is read by this command";
   refused({"predict", folder_ / "run", "--trials", log_, "--out", log_, "--force"}, log_, read);
   refused({"predict", folder_ / "run", "--trials", log_, "--out", model, "--force"}, model, read);
+  const std::string store = folder_ / "run/run.sqlite";
+  refused({"predict", folder_ / "run", "--trials", log_, "--out", store, "--force"}, store,
+          "is a store of simulations");
+  refused({"simulate", config_, "--out", store, "--force"}, store, "is a store of simulations");
   refused({"determine", config_, "--trials", log_, "--model", model, "--out", config_, "--force"},
           config_, read);
   refused({"simulate", config_, "--like", log_, "--out", log_, "--force"}, log_, read);

@@ -54,6 +54,12 @@ Result<std::vector<plan::Wanted>> wanted_of(const std::vector<std::string>& text
                      "', expected a value's name and how wide its 90 % interval may be, such as "
                      "separation=0.5% or delay=0.02"};
       }
+      if (*width >= 1) {
+        return Error{"--want is '" + text + "', a width of " + fmt::format("{:g}", 100 * *width) +
+                     " %, or of a metre, a second or a radian and more, which nobody has to drive "
+                     "for; for a hundredth write " +
+                     text.substr(0, equal) + "=1%"};
+      }
       wanted.width = *width;
     }
     all.push_back(wanted);

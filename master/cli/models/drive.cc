@@ -4,9 +4,11 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "common/base/suggest.h"
 #include "common/base/try.h"
@@ -53,7 +55,7 @@ Result<std::vector<double>> numbers(const std::string& text, std::size_t count,
   while (at < end && found.size() < count) {
     double value = 0;
     const auto [rest, error] = std::from_chars(at, end, value);
-    if (error != std::errc()) break;
+    if (error != std::errc() || !std::isfinite(value)) break;
     found.push_back(value);
     at = rest;
     if (at < end && *at == ',') ++at;
@@ -91,6 +93,11 @@ Result<Task> read_task(const DriveCommand& command, const Model& model) {
   if (kinds != 1) return Error{"give one of --commands, --waypoints and --log"};
   Task task;
   ASSIGN_OR_RETURN(const auto start, numbers(command.start, 3, "--start"));
+  if (std::abs(start[2]) > 2 * std::numbers::pi) {
+    return Error{"--start is '" + command.start + "': a heading of " +
+                 fmt::format("{:g}", start[2]) +
+                 " rad is more than a turn; degrees are multiplied by pi/180 first"};
+  }
   task.start = {start[0], start[1], wrap_angle(start[2])};
   for (const std::string& text : command.commands) {
     ASSIGN_OR_RETURN(const auto spec, command_of(text, model.commands));

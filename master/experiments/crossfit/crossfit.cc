@@ -52,6 +52,15 @@ class Crossfit {
   Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
       : problem_(problem), plan_(plan), farm_(farm) {}
 
+  // Whether there is something to tune on and to try on.
+  Status check(const TrialLog& log) const {
+    RETURN_IF_ERROR(select_trials(log, plan_.train));
+    for (const std::vector<std::string>& filters : plan_.tests) {
+      RETURN_IF_ERROR(select_trials(log, filters));
+    }
+    return {};
+  }
+
   Result<CrossfitGroup> group(const std::string& name, const TrialLog& log) {
     CrossfitGroup group;
     group.name = name;
@@ -252,6 +261,7 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
   Crossfit fit(problem, plan, farm);
   std::vector<CrossfitGroup> groups;
   if (plan.by.empty()) {
+    RETURN_IF_ERROR(fit.check(problem.log));
     plan.hooks.planned(stages_of({""}, plan, problem.genes.size()));
     plan.hooks.began(0);
     ASSIGN_OR_RETURN(auto group, fit.group("", problem.log));
@@ -260,6 +270,11 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
   }
   ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
   const std::vector<std::string> values = values_in(problem.log, by);
+  for (const std::string& value : values) {
+    const std::string filter = plan.by + "=" + value;
+    ASSIGN_OR_RETURN(const auto log, select_trials(problem.log, {&filter, 1}));
+    if (Status s = fit.check(log); !s) return Error{filter + ": " + s.error().message};
+  }
   plan.hooks.planned(stages_of(values, plan, problem.genes.size()));
   for (const std::string& value : values) {
     plan.hooks.began(groups.size());

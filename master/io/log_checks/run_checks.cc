@@ -264,7 +264,7 @@ RunChecks check_jumps(const RunLog& log) {
              few_digits(run.poses[far->to].t_s) + " s of " + name_of(run) + "; " +
              std::to_string(checks.false_poses.size() - before) +
              " poses that no step leads to are omitted.",
-         "Leave out poses that the tracker took from elsewhere, and number what follows a lasting "
+         "Remove poses that the tracker took from elsewhere, and number what follows a lasting "
          "jump as another run.",
          Severity::kNote});
   };

@@ -31,6 +31,12 @@ TEST(Usage, ReportsWhatWasFoundAndWhatWasExpected) {
   EXPECT_EQ(with("--workers", "5000"),
             "--workers is '5000', expected a whole number from 0 to 4096");
   EXPECT_EQ(with("--seed", "first"), "--seed is 'first', expected a whole number of at least 0");
+  for (const char* wrapped : {"-5", "99999999999999999999999"}) {
+    EXPECT_EQ(with("--seed", wrapped),
+              "--seed is '" + std::string(wrapped) + "', expected a whole number of at least 0");
+    EXPECT_THAT(with("--generations", wrapped), HasSubstr("expected a whole number"));
+  }
+  EXPECT_EQ(with("--seed", "18446744073709551615"), "no error");
   EXPECT_EQ(with("--target", "high"), "--target is 'high', expected a number");
   EXPECT_EQ(with("--time", "-3"), "--time is '-3', expected a number greater than 0");
   // Nothing would be done.

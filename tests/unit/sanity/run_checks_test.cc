@@ -53,7 +53,7 @@ TEST(RunChecks, ASoundLogPasses) {
   }
 }
 
-TEST(RunChecks, RunsThatSayNothingAreOmitted) {
+TEST(RunChecks, UselessRunsAreOmitted) {
   RunLog log = two_runs();
   for (PoseRow& row : log.runs[0].poses) row.X_WM = {1, 2, 3};
   for (CommandRow& row : log.runs[1].commands) row.values = {0, 0};
