@@ -110,6 +110,15 @@ void drop_stale_frames(GroundSearch* search) {
   }
 }
 
+// The best that values near the file's do with poses on a clock of their own.
+double objective_with_own_clock(const WindowFitter& fitter, std::vector<FitRow> rows,
+                                const Eigen::VectorXd& values) {
+  const Eigen::Index delay = row_index(rows, "delay");
+  if (delay < 0 || fitter.windows().simulated) return kNeverSo;
+  rows[static_cast<std::size_t>(delay)].free = true;
+  return fitter.fit(rows, {}, scan_delay(fitter, rows, values)).objective;
+}
+
 }  // namespace
 
 Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
@@ -124,8 +133,10 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
     search->rows = held_rows(question.rows);
     const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
     search->fit = fitter.fit(search->rows);
-    // Values a little off must not do as well.
+    // Values a little off must not do as well, nor must a clock that is far off.
     if (!fault || fault->objective < search->fit.objective) break;
+    const double delayed = objective_with_own_clock(fitter, search->rows, search->fit.values);
+    if (fault->objective < delayed) break;
     search->faults.push_back(*fault);
     search->log = std::move(fault->log);
   }

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "common/base/ranges.h"
 #include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {
@@ -105,6 +106,17 @@ TEST(DiagnoseGround, FindsOneOfManyThings) {
     EXPECT_LE(found.diagnosis.effects.size(), 2u) << c.effect;
     if (effect.name == c.effect) expect_size(effect, c.key, c.size);
   }
+}
+
+// Turns by commands of other seconds are met best by next to none: commands in degrees would be.
+TEST(DiagnoseGround, AClockThatIsFarOffIsNoUnit) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const GroundDiagnosis found =
+      diagnosis_of(robot, driven(robot, off_by({"separation", "delay"}, {1.6, 3})));
+  const std::vector<std::string> names = mapped(found.diagnosis.effects, &NamedEffect::name);
+  EXPECT_FALSE(contains(names, "unit_error")) << found.diagnosis.headline;
+  EXPECT_TRUE(contains(names, "command_delay")) << found.diagnosis.headline;
+  EXPECT_TRUE(contains(names, "wheel_separation")) << found.diagnosis.headline;
 }
 
 // Every run has a clock of its own: how far they are apart is in the interval of their mean,
