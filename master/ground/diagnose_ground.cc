@@ -116,17 +116,20 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
                         [](const SanityFinding& f) { return f.text + " " + f.remedy; })};
   }
   const RunLog log = without(logged, checks);
+  GroundDiagnoseOptions useful = options;
+  if (useful.reference)
+    useful.reference = without(*options.reference, check_jumps(*options.reference));
   auto result = guarded([&]() -> Result<GroundDiagnosis> {
-    const RunLog* reference = options.reference ? &*options.reference : nullptr;
+    const RunLog* reference = useful.reference ? &*useful.reference : nullptr;
     const bool measured = has_wheel_speeds(robot, log) &&
                           (reference == nullptr || has_wheel_speeds(robot, *reference));
-    if (!measured) return diagnose_by(robot, log, options, ask_what_is_wrong(robot, log));
-    GroundDiagnoseOptions of_slip = options;
+    if (!measured) return diagnose_by(robot, log, useful, ask_what_is_wrong(robot, log));
+    GroundDiagnoseOptions of_slip = useful;
     if (reference != nullptr) of_slip.reference = driven_by_wheels(*reference);
     const GroundRobot driven = driven_by_wheels(robot, log);
     const RunLog wheels = driven_by_wheels(log);
     return diagnose_driven(robot, driven, wheels, of_slip,
-                           measure_wheel_loop(robot, log, reference, options.seed),
+                           measure_wheel_loop(robot, log, reference, useful.seed),
                            ask_what_is_wrong(driven, wheels));
   });
   if (!result) return result;

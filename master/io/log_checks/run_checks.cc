@@ -13,8 +13,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kMoves_m =
-    0.2;  // of nine tenths of a run's poses, from its middle: no tracker's noise
+// Nine tenths of a run's poses lie within it of their middle: a tracker's noise.
+constexpr double kNoMove_m = 0.2;
 constexpr double kLeastGap_s = 10;  // twice the longest windows
 constexpr double kTimesUsualGap = 50;
 // Of a step over the commonest and over those about it: no robot gathers speed so fast.
@@ -50,7 +50,7 @@ bool travels(const LoggedRun& run) {
   for (const PoseRow& row : run.poses) {
     away_m.push_back(std::hypot(row.X_WM.x - middle_x, row.X_WM.y - middle_y));
   }
-  return quantile(away_m, 0.9) > kMoves_m;
+  return quantile(away_m, 0.9) > kNoMove_m;
 }
 
 bool same_poses(const LoggedRun& a, const LoggedRun& b) {
@@ -93,7 +93,7 @@ void add_useless_runs(const RunLog& log, RunChecks* checks) {
     if (of.count > 0) checks->findings.push_back({name, what + of.text() + ".", remedy, severity});
   };
   report(still, "still_runs", "The poses never change, though the robot is commanded to drive: ",
-         "Log these runs again: the tracker stood still. They are omitted.");
+         "Log these runs again: the tracker stood still, or the robot. They are omitted.");
   report(driverless, "uncommanded_runs", "Every command is 0, though the robot travels: ",
          "Log the commands that it was driven by. These runs are omitted.");
   report(copies, "repeated_runs",
@@ -107,12 +107,18 @@ struct Step {
 
 using Length = std::function<double(const Pose&, const Pose&)>;
 
-// Of poses that may have a gap before them; as long as usual at least.
-std::vector<double> usual_times(const LoggedRun& run) {
+// Of each pose but the first, s since the one before.
+std::vector<double> times_between(const LoggedRun& run) {
   std::vector<double> apart_s;
   for (std::size_t i = 1; i < run.poses.size(); ++i) {
     apart_s.push_back(run.poses[i].t_s - run.poses[i - 1].t_s);
   }
+  return apart_s;
+}
+
+// Of each pose, how many usual times it comes after the one before; one at least.
+std::vector<double> usual_times(const LoggedRun& run) {
+  const std::vector<double> apart_s = times_between(run);
   const double usual_s = apart_s.empty() ? 1 : std::max(median(apart_s), 1e-9);
   std::vector<double> times = {1};
   for (const double s : apart_s) times.push_back(std::max(1.0, s / usual_s));
@@ -149,8 +155,7 @@ Jumps jumps_of(const RunLog& log, double least, double most, const Length& lengt
     for (std::size_t j = k - std::min(k, kNeighbours); j < end; ++j) {
       if (j != k && steps[j].run == steps[k].run) about.push_back(steps[j].length);
     }
-    if (about.empty()) continue;
-    if (!(steps[k].length > limit(median(about)))) continue;
+    if (about.empty() || !(steps[k].length > limit(median(about)))) continue;
     jumps.steps.push_back(steps[k]);
   }
   return jumps;
@@ -218,10 +223,7 @@ void omit_jumps(const RunLog& log, const Jumps& jumps, const Length& length, Run
 void add_gaps(const RunLog& log, RunChecks* checks) {
   Places gaps;
   for (const LoggedRun& run : log.runs) {
-    std::vector<double> apart_s;
-    for (std::size_t i = 1; i < run.poses.size(); ++i) {
-      apart_s.push_back(run.poses[i].t_s - run.poses[i - 1].t_s);
-    }
+    const std::vector<double> apart_s = times_between(run);
     if (apart_s.empty()) continue;
     const double most_s = std::max(kLeastGap_s, kTimesUsualGap * median(apart_s));
     for (std::size_t i = 0; i < apart_s.size(); ++i) {

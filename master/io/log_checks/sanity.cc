@@ -71,6 +71,7 @@ void check_axes_of_sessions(const Problem& problem, const std::vector<DriveSampl
     auto axes = check_axes(its);
     if (!axes) continue;
     axes->text = "In session " + session + " alone: " + axes->text;
+    axes->remedy = "In session " + session + " alone: " + axes->remedy;
     findings->push_back(std::move(*axes));
   }
 }
