@@ -17,8 +17,9 @@ namespace {
 constexpr double kNoMove_m = 0.2;
 constexpr double kLeastGap_s = 10;  // twice the longest windows
 constexpr double kTimesUsualGap = 50;
-// Of a step over the commonest and over those about it: no robot gathers speed so fast.
+// Of a step, over what four in five are and over those about it: no robot gathers speed so fast.
 constexpr double kTimesUsualStep = 20;
+constexpr double kLeastJump_m = 0.1;  // coarse grids step by less, with none in between
 constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;
 constexpr double kTimesAStep = 3;       // where half a turn is no more than a few of them
 constexpr std::size_t kNeighbours = 4;  // either way
@@ -270,7 +271,7 @@ RunChecks check_jumps(const RunLog& log) {
          "jump as another run.",
          Severity::kNote});
   };
-  report(0, INFINITY, "pose_jumps", "Positions", "m",
+  report(kLeastJump_m, INFINITY, "pose_jumps", "Positions", "m",
          [](const Pose& a, const Pose& b) { return std::hypot(b.x - a.x, b.y - a.y); });
   report(kLeastTurn_rad, kMostTurn_rad, "heading_jumps", "Headings", "rad",
          [](const Pose& a, const Pose& b) { return std::abs(wrap_angle(b.theta - a.theta)); });

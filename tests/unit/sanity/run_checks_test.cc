@@ -117,6 +117,17 @@ TEST(RunChecks, AfterALastingJumpTheRunGoesOn) {
   EXPECT_TRUE(checks.false_poses.empty());
 }
 
+TEST(RunChecks, ACoarseGridIsNoJump) {
+  RunLog log = two_runs();
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses) {
+      row.X_WM.x = 0.05 * std::round(row.X_WM.x / 0.05);
+      row.X_WM.y = 0.05 * std::round(row.X_WM.y / 0.05);
+    }
+  }
+  EXPECT_TRUE(check_jumps(log).findings.empty());
+}
+
 TEST(RunChecks, AGapInTimeIsNoJump) {
   RunLog log = two_runs();
   std::vector<PoseRow>& poses = log.runs[0].poses;
