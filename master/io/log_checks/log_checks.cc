@@ -38,17 +38,8 @@ std::string row_text(const Trial& trial) {
 
 // How far they end from their middle, half of them.
 double spread_of_ends(const TrialLog& log, std::span<const TrialLength> these) {
-  std::vector<double> x, y, away;
-  for (const TrialLength& t : these) {
-    x.push_back(log.trials[t.trial].X_WE.x);
-    y.push_back(log.trials[t.trial].X_WE.y);
-  }
-  const double middle_x = median(x), middle_y = median(y);
-  for (const TrialLength& t : these) {
-    const Pose& X = log.trials[t.trial].X_WE;
-    away.push_back(std::hypot(X.x - middle_x, X.y - middle_y));
-  }
-  return median(away);
+  return median(
+      from_middle(mapped(these, [&](const TrialLength& t) { return log.trials[t.trial].X_WE; })));
 }
 
 // "session s3", or which trials these are.
@@ -65,6 +56,11 @@ std::string place_of(const TrialLog& log, std::span<const TrialLength> these,
 }
 
 }  // namespace
+
+std::vector<double> from_middle(const std::vector<Pose>& poses) {
+  const double x = median(mapped(poses, &Pose::x)), y = median(mapped(poses, &Pose::y));
+  return mapped(poses, [&](const Pose& X) { return std::hypot(X.x - x, X.y - y); });
+}
 
 std::string few_digits(double value) { return formatted("%.3g", value); }
 

@@ -28,6 +28,9 @@ struct TrialLength {
 bool check_mixed_units(const TrialLog& log, std::vector<TrialLength> lengths, const char* trials,
                        const char* columns, std::vector<SanityFinding>* findings);
 
+// Of each pose, how far it lies from where the medians of x and y are.
+std::vector<double> from_middle(const std::vector<Pose>& poses);
+
 // "3.1 %", "0.25": few digits, no trailing zeros.
 std::string few_digits(double value);
 

@@ -41,17 +41,8 @@ bool never_moves(const LoggedRun& run) {
 }
 
 bool travels(const LoggedRun& run) {
-  std::vector<double> x, y, away_m;
-  for (const PoseRow& row : run.poses) {
-    x.push_back(row.X_WM.x);
-    y.push_back(row.X_WM.y);
-  }
-  if (x.empty()) return false;
-  const double middle_x = median(x), middle_y = median(y);
-  for (const PoseRow& row : run.poses) {
-    away_m.push_back(std::hypot(row.X_WM.x - middle_x, row.X_WM.y - middle_y));
-  }
-  return quantile(away_m, 0.9) > kNoMove_m;
+  if (run.poses.empty()) return false;
+  return quantile(from_middle(mapped(run.poses, &PoseRow::X_WM)), 0.9) > kNoMove_m;
 }
 
 bool same_poses(const LoggedRun& a, const LoggedRun& b) {
@@ -177,8 +168,35 @@ std::size_t surest_pose(const std::vector<std::size_t>& cuts, std::size_t poses)
   return middle;
 }
 
-// Poses that no usual step leads to from where the robot was last; where they are too many, it is
-// there from then on.
+// From a sure pose to one end of a run: poses that no usual step leads to from where the robot was
+// last; where they are too many, it is there from then on.
+std::vector<std::size_t> lost_poses(const LoggedRun& run, std::size_t start, int way, double usual,
+                                    const Length& length) {
+  const std::vector<PoseRow>& poses = run.poses;
+  const std::vector<double> times = usual_times(run);
+  const auto most = static_cast<std::size_t>(kMostLost * static_cast<double>(poses.size()));
+  std::vector<std::size_t> all, lost;
+  std::size_t last = start;
+  for (std::size_t i = start + way; i < poses.size(); i += way) {  // below 0 it is large
+    const auto leads = [&](std::size_t from, double longer) {
+      return length(poses[from].X_WM, poses[i].X_WM) <= usual * longer;
+    };
+    // It went on while it was lost, a usual step at a time.
+    const double time = times[way > 0 ? i : i + 1];
+    const double more = static_cast<double>(lost.size()) / kTimesUsualStep;
+    const bool is_back = leads(last, time + more);
+    if (!is_back) lost.push_back(i);
+    if (!is_back && lost.size() <= most) continue;
+    // Back without a jump it had only gone on.
+    const bool was_lost = is_back && !lost.empty() && !leads(lost.back(), time);
+    if (was_lost) all.insert(all.end(), lost.begin(), lost.end());
+    lost.clear();
+    last = i;
+  }
+  all.insert(all.end(), lost.begin(), lost.end());
+  return all;
+}
+
 void omit_jumps(const RunLog& log, const Jumps& jumps, const Length& length, RunChecks* checks) {
   for (std::size_t r = 0; r < log.runs.size(); ++r) {
     std::vector<std::size_t> cuts;
@@ -186,37 +204,11 @@ void omit_jumps(const RunLog& log, const Jumps& jumps, const Length& length, Run
       if (step.run == r) cuts.push_back(step.to);
     }
     if (cuts.empty()) continue;
-    const std::vector<PoseRow>& poses = log.runs[r].poses;
-    const std::vector<double> times = usual_times(log.runs[r]);
-    const auto most = static_cast<std::size_t>(kMostLost * static_cast<double>(poses.size()));
-    const std::size_t start = surest_pose(cuts, poses.size());
+    const std::size_t start = surest_pose(cuts, log.runs[r].poses.size());
     for (const int way : {1, -1}) {
-      std::size_t last = start;
-      std::vector<std::size_t> lost;
-      const auto omit_lost = [&] {
-        for (const std::size_t i : lost) checks->false_poses.insert({r, i});
-        lost.clear();
-      };
-      for (std::size_t i = start + way; i < poses.size(); i += way) {  // below 0 it is large
-        const auto leads = [&](std::size_t from, double longer) {
-          return length(poses[from].X_WM, poses[i].X_WM) <= jumps.usual * longer;
-        };
-        // It went on while it was lost, a usual step at a time.
-        const double time = times[way > 0 ? i : i + 1];
-        const double more = static_cast<double>(lost.size()) / kTimesUsualStep;
-        if (leads(last, time + more)) {
-          // Back without a jump it had only gone on.
-          if (!lost.empty() && leads(lost.back(), time)) lost.clear();
-          omit_lost();
-          last = i;
-          continue;
-        }
-        lost.push_back(i);
-        if (lost.size() <= most) continue;
-        lost.clear();
-        last = i;
+      for (const std::size_t i : lost_poses(log.runs[r], start, way, jumps.usual, length)) {
+        checks->false_poses.insert({r, i});
       }
-      omit_lost();
     }
   }
 }

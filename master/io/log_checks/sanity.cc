@@ -136,10 +136,6 @@ void note_impossible(const Problem& problem, const ImpossibleTrials& found,
 
 }  // namespace
 
-std::vector<std::size_t> impossible_trials(const Problem& problem) {
-  return find_impossible(problem).rows();
-}
-
 std::vector<SanityFinding> check_sanity(const Problem& problem,
                                         std::vector<std::size_t>* impossible) {
   std::vector<SanityFinding> findings;

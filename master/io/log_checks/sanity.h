@@ -14,13 +14,11 @@ namespace gapfarm {
 inline constexpr std::size_t kFewestTrials = 40;
 
 // The worst first.  A pure function of log and config that takes milliseconds; robust against a few
-// per cent of wild rows.  `impossible`: set to impossible_trials(), unless there are none at all.
+// per cent of wild rows.  `impossible`: set to the trials that cannot be, ascending: drives for
+// which the robot would have had to move at more than twice the log's own speed and 30 cm beyond
+// (none where they are so many that the speed itself is in question), and trials that other
+// readings contradict (false_readings()).
 std::vector<SanityFinding> check_sanity(const Problem& problem,
                                         std::vector<std::size_t>* impossible = nullptr);
-
-// Trials of a log of drives that cannot be: the robot would have had to move at more than twice the
-// log's own speed and 30 cm beyond (none where they are so many that the speed itself is in
-// question), or other readings contradict theirs (false_readings()).  Ascending.
-std::vector<std::size_t> impossible_trials(const Problem& problem);
 
 }  // namespace gapfarm

@@ -48,6 +48,12 @@ std::string named(const Problem& problem) {
   return findings.empty() ? "" : findings.front().name;
 }
 
+std::vector<std::size_t> impossible_trials(const Problem& problem) {
+  std::vector<std::size_t> rows;
+  check_sanity(problem, &rows);
+  return rows;
+}
+
 TEST(PushChecks, LeaveOutPiecesThatTheTrackerHasLost) {
   Problem log = pushed();
   EXPECT_EQ(impossible_trials(log), std::vector<std::size_t>());

@@ -69,6 +69,12 @@ std::string first_name(const Problem& problem) {
   return findings.empty() ? "" : findings.front().name;
 }
 
+std::vector<std::size_t> impossible_trials(const Problem& problem) {
+  std::vector<std::size_t> rows;
+  check_sanity(problem, &rows);
+  return rows;
+}
+
 TEST(Sanity, HasNoWarningsAboutASoundLog) {
   for (std::uint64_t seed : {1, 2, 3}) EXPECT_EQ(first_name(drawn_drives(200, {}, seed)), "");
 }
