@@ -118,13 +118,14 @@ const CLI::App& innermost(const CLI::App& app, std::string* arguments) {
 
 // Answers a command line that was not understood, and --help and --version.
 int answer_parse_error(const CLI::App& app, const CLI::ParseError& error, Console& console) {
-  if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
   std::string command;
   const CLI::App& at = innermost(app, &command);
   const std::vector<std::string> unknown = app.remaining(true);
-  if (!unknown.empty()) {
-    const std::string& word = unknown.front();
-    const bool is_command = &at == &app && !is_option(word);
+  const std::string word = unknown.empty() ? "" : unknown.front();
+  const bool is_command = !word.empty() && !is_option(word) && !at.get_subcommands({}).empty();
+  // --help, --version; but no help is about a command that there is not.
+  if (error.get_exit_code() == 0 && !is_command) return app.exit(error);
+  if (!word.empty()) {
     console.error({(is_command ? "unknown command '" : "did not expect '") + word + "'" +
                    did_you_mean(at, word)});
   } else if (&at == &app) {
@@ -161,7 +162,7 @@ std::unique_ptr<Program> make_program() {
 }
 
 void parse_arguments(Program& program, std::vector<std::string> arguments) {
-  if (!arguments.empty() && arguments[0] == "help") {
+  while (!arguments.empty() && arguments[0] == "help") {
     arguments.erase(arguments.begin());
     arguments.push_back("--help");
   }

@@ -26,7 +26,12 @@ TEST(CliUsage, AnswersWhatPeopleTry) {
   const Finished help = gapfarm_command({"help", "evolve"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_EQ(help.out, gapfarm_command({"evolve", "--help"}).out);
-  EXPECT_THAT(gapfarm_command({"chekc"}).err, HasSubstr("did you mean 'check'?"));
+  EXPECT_EQ(gapfarm_command({"help", "help"}).exit_code, 0);
+  for (const auto& wrong : std::vector<std::vector<std::string>>{{"chekc"}, {"help", "chekc"}}) {
+    const Finished answer = gapfarm_command(wrong);
+    EXPECT_EQ(answer.exit_code, 2);
+    EXPECT_THAT(answer.err, HasSubstr("unknown command 'chekc'; did you mean 'check'?"));
+  }
   const Finished key = gapfarm_command({"keys", "revoke", "--help"});
   EXPECT_THAT(key.out, HasSubstr("Examples:\n  gapfarm keys revoke"));
   const Finished worker =
