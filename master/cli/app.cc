@@ -75,23 +75,27 @@ void declare_json(CLI::App& app, bool* json) {
   if (inner.empty()) app.add_flag("--json", *json, "Print results, or the error, as JSON");
 }
 
-// CLI11 takes -1 for the greatest number that there is, and what is greater for it, too.
-void refuse_wrapped_numbers(CLI::App& app) {
-  for (CLI::App* sub : app.get_subcommands({})) refuse_wrapped_numbers(*sub);
+bool is_option(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
+
+// CLI11 takes -1 for the greatest number that there is, and what is greater for it, too; and the
+// next option for the value of one that has none.
+void refuse_wrong_values(CLI::App& app) {
+  for (CLI::App* sub : app.get_subcommands({})) refuse_wrong_values(*sub);
   for (CLI::Option* option : app.get_options()) {
-    if (!option->get_type_name().starts_with("UINT")) continue;
+    const bool whole = option->get_type_name().starts_with("UINT");
     option->check(CLI::Validator(
-        [](const std::string& text) -> std::string {
+        [&app, whole](const std::string& text) -> std::string {
+          if (is_option(text) && app.get_option_no_throw(text) != nullptr) {
+            return "a value is missing before '" + text + "'";
+          }
           errno = 0;
           std::strtoull(text.c_str(), nullptr, 10);
-          if (!text.starts_with("-") && errno != ERANGE) return {};
+          if (!whole || (!text.starts_with("-") && errno != ERANGE)) return {};
           return "Value " + text + " not in range 0 to 18446744073709551615";
         },
         ""));
   }
 }
-
-bool is_option(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
 
 // What `word` may have meant: an option of `app`, or one of its subcommands.
 std::string did_you_mean(const CLI::App& app, const std::string& word) {
@@ -156,7 +160,7 @@ std::unique_ptr<Program> make_program() {
     CLI::App* sub = app.add_subcommand(row.name, row.summary)->group(row.group);
     program->runs.push_back(row.setup(*sub));
     declare_json(*sub, &program->json);
-    refuse_wrapped_numbers(*sub);
+    refuse_wrong_values(*sub);
   }
   return program;
 }

@@ -52,6 +52,14 @@ TEST(Usage, NamesTheOptionThatTookTheConfig) {
   EXPECT_EQ(sentence_of({"evolve", "--trials", "log.csv", "--out", "x"}), "CONFIG is required");
 }
 
+TEST(Usage, NoOptionIsTheValueOfAnother) {
+  EXPECT_EQ(sentence_of({"evolve", "c.toml", "--trials", "--out", "x"}),
+            "--trials: a value is missing before '--out'");
+  EXPECT_EQ(sentence_of({"evolve", "c.toml", "--out", "--seed"}),
+            "--out: a value is missing before '--seed'");
+  EXPECT_EQ(sentence_of({"evolve", "c.toml", "--out", "x", "--target", "-3"}), "no error");
+}
+
 TEST(Usage, HelpIsACommandToo) {
   EXPECT_EQ(sentence_of({"help", "evolve"}), "help");
   EXPECT_EQ(sentence_of({"help", "keys", "make"}), "help");
