@@ -22,7 +22,7 @@ const char* remedy(int code) {
     case SQLITE_LOCKED:
       return "another program holds the file; close it and try again";
     case SQLITE_FULL:
-      return "free some disk space and resume the run";
+      return "free some disk space; then the same command goes on, a run by `gapfarm resume`";
     case SQLITE_READONLY:
       return (code == SQLITE_READONLY_ROLLBACK || code == SQLITE_READONLY_RECOVERY)
                  ? "a crash left a half-written generation that must be rolled back: run the "
