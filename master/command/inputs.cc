@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "common/base/build_info.h"
+#include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
@@ -265,9 +266,15 @@ Result<Model> find_model(const std::string& run_or_model, Console& console) {
   if (left && left->origin.generation >= reached) return *std::move(left);
   Result<Model> model = current_best(run);
   if (!model) return model;
-  console.note(run_or_model + ": this run is not finished; taking its best so far, " +
-               run.info().fitness + " " + format_number(model->score) + " of generation " +
-               std::to_string(model->origin.generation));
+  ASSIGN_OR_RETURN(const Progress progress, run.progress());
+  console.note(
+      run_or_model +
+      (progress.state == RunState::kFinished
+           ? ": this run is finished, but its model.toml is missing or old (gapfarm resume " +
+                 shell_quoted(run_or_model) + " makes it again); taking its best, "
+           : ": this run is not finished; taking its best so far, ") +
+      run.info().fitness + " " + format_number(model->score) + " of generation " +
+      std::to_string(model->origin.generation));
   return model;
 }
 

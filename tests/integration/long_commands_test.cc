@@ -205,7 +205,10 @@ TEST_F(LongCommands, AModelIsAsNewAsItsRun) {
     return gapfarm_command(
         {"predict", run, "--trials", kDemoLog, "--out", folder_ / "p.csv", "--workers", "1"});
   };
-  EXPECT_THAT(predict().err, Not(HasSubstr("not finished")));
+  EXPECT_THAT(predict().err, Not(HasSubstr("taking its best")));
+  std::filesystem::remove(run + "/model.toml");
+  EXPECT_THAT(predict().err, AllOf(HasSubstr("its model.toml is missing"),
+                                   HasSubstr("gapfarm resume"), Not(HasSubstr("not finished"))));
   RunningProgram master("gapfarm", {"resume", run, "--generations", "100000", "--workers", "1"});
   ASSERT_TRUE(wait_until([&] { return status_of(run).value("generation", 0) >= 3; }));
   master.send(SIGINT);
