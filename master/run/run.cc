@@ -115,9 +115,8 @@ Status leave_model(RunStore& store, const RunRequest& run, const RunInputs& inpu
     summary.held_out = inputs.held_out->log.trials.size();
     summary.validated = std::move(validated);
   }
-  const Status left =
-      write_outputs(store, run.problem, run.config, summary.evolved, farm, summary.validated);
-  if (!left) return left;
+  RETURN_IF_ERROR(write_outputs(store, run.problem, run.config, summary.evolved, farm,
+                                summary.validated, watcher));
   ASSIGN_OR_RETURN(const auto beside, baseline_note_of_run(run.problem, best, farm));
   if (!beside.empty()) watcher.note(beside);
   for (const std::string& name : output_files(run.problem))

@@ -9,6 +9,7 @@
 #include <limits>
 #include <sstream>
 
+#include "common/base/hash.h"
 #include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
@@ -214,6 +215,22 @@ Status write_fitness(const RunStore& store) {
                                              info.fitness_unit, info.higher_is_better));
 }
 
+// In place of the one that the run left when it last ended; one that it did not leave is kept.
+Status replace_model(RunStore& store, const Model& model, RunWatcher& watcher) {
+  const std::string file = (store.run() / "model.toml").string();
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(store.run()));
+  ASSIGN_OR_RETURN(const auto left, reader.document("model"));
+  const auto quoted_hash = [](const std::string& s) { return '"' + content_hash(s) + '"'; };
+  const Result<std::string> there = read_text_file(file);
+  if (there && (!left || left->json != quoted_hash(*there))) {
+    const std::string kept = file + "." + content_hash(*there).substr(0, 8);
+    RETURN_IF_ERROR(write_file_atomically(kept, *there));
+    watcher.note(file + " is not as this run left it; it is kept as " + kept);
+  }
+  RETURN_IF_ERROR(write_model(model, file));
+  return store.keep_document("model", quoted_hash(format_model(model)));
+}
+
 Status write_page(const RunStore& store) {
   ASSIGN_OR_RETURN(const auto report, read_run_report({store.run(), {}, {}}));
   return write_file_atomically((store.run() / "report.html").string(), run_html(report));
@@ -327,9 +344,9 @@ std::vector<std::string> output_files(const Problem& problem) {
 
 Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
                      const EvolveSummary& summary, Farm& farm,
-                     const std::vector<ScoreRow>& validated) {
+                     const std::vector<ScoreRow>& validated, RunWatcher& watcher) {
   const Model model = model_of(store, problem, config, summary);
-  RETURN_IF_ERROR(write_model(model, (store.run() / "model.toml").string()));
+  RETURN_IF_ERROR(replace_model(store, model, watcher));
   if (!is_value(problem.fitness.kind)) {
     RETURN_IF_ERROR(write_poses(store, problem, summary, farm, validated));
   }

@@ -41,6 +41,6 @@ std::vector<std::string> output_files(const Problem& problem);
 // `validated`: what is known of trials held out.  REQUIRES: a best member whose outcome is OK.
 Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
                      const EvolveSummary& summary, Farm& farm,
-                     const std::vector<ScoreRow>& validated);
+                     const std::vector<ScoreRow>& validated, RunWatcher& watcher);
 
 }  // namespace gapfarm

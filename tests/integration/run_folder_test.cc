@@ -70,6 +70,19 @@ TEST_F(RunFolder, ReadOnlyIsReportedAndCanStillBeLookedAt) {
   EXPECT_EQ(resume(run_, "3").exit_code, 0);
 }
 
+TEST_F(RunFolder, AnEditedModelIsKept) {
+  ASSERT_EQ(evolve(run_, "1").exit_code, 0);
+  const std::string file = run_ + "/model.toml", left = text_of(file);
+  EXPECT_THAT(resume(run_, "2").err, Not(HasSubstr("kept as")));
+  std::ofstream(file) << left << "# mine\n";
+  const std::string said = resume(run_, "2").err;
+  EXPECT_THAT(said, HasSubstr(file + " is not as this run left it; it is kept as " + file + "."));
+  const std::string kept = file + said.substr(said.find("kept as ") + 8 + file.size(), 9);
+  EXPECT_EQ(text_of(kept), left + "# mine\n");
+  EXPECT_THAT(text_of(file), Not(HasSubstr("# mine")));
+  EXPECT_THAT(resume(run_, "3").err, Not(HasSubstr("kept as")));
+}
+
 TEST_F(RunFolder, WhereOneEndedAnotherBegins) {
   ASSERT_EQ(evolve(run_, "12").exit_code, 0);
   const auto begun = [&](const std::string& config, const std::string& from) {
