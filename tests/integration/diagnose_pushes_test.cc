@@ -120,6 +120,8 @@ TEST_F(DiagnosePushes, OfAFewPushesNothingIsReported) {
   const Json d = diagnose(12, {"com_offset.y=0.008"});
   EXPECT_EQ(d["verdict"], "unusable") << d["headline"];
   EXPECT_TRUE(d["effects"].empty());
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "d/model.toml"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "d/tuned.toml"));
 }
 
 }  // namespace gapfarm::diagnose_pushes_test

@@ -116,8 +116,8 @@ Status write_model(const Model& model, const std::filesystem::path& path, const 
   return outputs.write(path.string(), format_model(model));
 }
 
-Status write_all(const Config& config, const DiagnoseCommand& command,
-                 const DiagnosisResult& result) {
+Status write_models(const Config& config, const DiagnoseCommand& command,
+                    const DiagnosisResult& result) {
   const std::filesystem::path out(command.out);
   Model model = model_of(config, result, result.final_, "diagnosed");
   model.residual = result.residual;
@@ -128,7 +128,24 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
   }
   RETURN_IF_ERROR(write_model(model, out / "model.toml", command.outputs));
   const Model tuned = model_of(config, result, result.tuned, "tuned");
-  RETURN_IF_ERROR(write_model(tuned, out / "tuned.toml", command.outputs));
+  return write_model(tuned, out / "tuned.toml", command.outputs);
+}
+
+bool has_models(const DiagnosisResult& result) {
+  return result.diagnosis.verdict != Verdict::kUnusable;
+}
+
+Status write_all(const Config& config, const DiagnoseCommand& command,
+                 const DiagnosisResult& result) {
+  const std::filesystem::path out(command.out);
+  if (has_models(result)) {
+    RETURN_IF_ERROR(write_models(config, command, result));
+  } else {
+    // Those of a diagnosis that this one replaces are not of it.
+    std::error_code ignored;
+    for (const char* name : {"model.toml", "tuned.toml"})
+      std::filesystem::remove(out / name, ignored);
+  }
   const Status report =
       command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
   if (!report) return report;
@@ -248,7 +265,8 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
   RETURN_IF_ERROR(write_all(config, command, result));
   context.console.result(diagnosis_summary(result.diagnosis),
                          diagnosis_summary_json(result.diagnosis, command));
-  context.console.note("wrote: " + command.out + "/report.html, diagnosis.json, model.toml");
+  context.console.note("wrote: " + command.out + "/report.html, diagnosis.json" +
+                       (has_models(result) ? ", model.toml" : ""));
   return asked->given_up() > 0 ? kExitQuarantined : kExitDone;
 }
 
