@@ -96,6 +96,15 @@ TEST_F(LongCommands, CrossfitsGoOnWithoutAFolder) {
   EXPECT_EQ(kept(), "none") << "it is gone when the command has ended well";
 }
 
+TEST_F(LongCommands, AMistakeInACrossfitIsFoundBeforeItsWork) {
+  for (const char* option : {"--sweep", "--per", "--repeats"}) {
+    const Finished refused = gapfarm_command({"crossfit", slow_, option, "nosuch"}, environment_);
+    EXPECT_EQ(refused.exit_code, 1);
+    EXPECT_THAT(refused.err, AllOf(HasSubstr("nosuch"), Not(HasSubstr("fit: 0 of"))));
+    EXPECT_TRUE(std::filesystem::is_empty(folder_ / "state/gapfarm")) << option;
+  }
+}
+
 // Everything that one batch of the farm holds may be at stake.
 TEST_F(LongCommands, SimulationsGoOnBesideTheirFile) {
   const auto arguments = [&](const std::string& out) {

@@ -52,11 +52,18 @@ class Crossfit {
   Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
       : problem_(problem), plan_(plan), farm_(farm) {}
 
-  // Whether there is something to tune on and to try on.
+  // Whether there is something to tune on and to try on, and all that is named.
   Status check(const TrialLog& log) const {
     RETURN_IF_ERROR(select_trials(log, plan_.train));
     for (const std::vector<std::string>& filters : plan_.tests) {
       RETURN_IF_ERROR(select_trials(log, filters));
+    }
+    std::vector<std::string> columns = plan_.repeats;
+    if (!plan_.per.empty()) columns.push_back(plan_.per);
+    for (const std::string& column : columns) RETURN_IF_ERROR(trial_column_reader(log, column));
+    for (const std::string& key : plan_.sweeps) {
+      if (!problem_.table().find(key))
+        return Error{"--sweep " + key + ": there is no such parameter"};
     }
     return {};
   }
@@ -136,8 +143,7 @@ class Crossfit {
   Result<Sweep> sweep(const std::string& key, const TrialLog& train, const TrialLog& test,
                       const ParameterValues& around) {
     const ParameterTable& table = problem_.table();
-    const auto row = table.find(key);
-    if (!row) return Error{"--sweep " + key + ": there is no such parameter"};
+    const auto row = table.find(key);  // check() found it
     // Over the gene's range where it is one, else over the row's.
     Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
     for (const Gene& searched : problem_.genes) {
