@@ -194,6 +194,11 @@ TEST_F(ObjectiveRuns, CheckEvaluatesOnceAndCompareNeedsNoTrials) {
   EXPECT_EQ(compared.exit_code, 0) << compared.err;
   EXPECT_THAT(compared.out, HasSubstr("random search"));
   EXPECT_EQ(gapfarm_command({"check", config("    os._exit(1)\n")}).exit_code, 3);
+  const std::string fails =
+      "    answer = {'id': task['id'], 'outcome': 'failed', 'message': 'no mesh'}\n";
+  const Finished failed = gapfarm_command({"check", config(fails)});
+  EXPECT_EQ(failed.exit_code, 2);
+  EXPECT_THAT(failed.out, AllOf(HasSubstr("own values failed: no mesh"), Not(HasSubstr(": fine"))));
 }
 
 TEST_F(ObjectiveRuns, WhatNeedsTrialsRefusesInOneSentence) {

@@ -242,8 +242,15 @@ std::string value_text(const FitnessSettings& fitness, const Summary& summary) {
   }
 }
 
+bool has_failed(const v1::TaskResult& result) {
+  return result.outcome() != v1::OK && result.outcome() != v1::INFEASIBLE;
+}
+
 std::string standing(const Summary& summary) {
-  if (summary.evaluated.outcome() == v1::WORKER_FAILED) return "readable, but the program failed";
+  const v1::TaskResult& result = summary.evaluated;
+  if (has_failed(result)) {
+    return "readable, but the evaluation at the config's own values failed: " + result.message();
+  }
   const std::vector<SanityFinding>& findings = summary.sanity;
   for (const SanityFinding& f : findings) {
     if (f.severity != Severity::kNote) return "readable, but " + finding_phrase(f);
@@ -339,7 +346,7 @@ Result<int> run_check(const CheckOptions& options, CliContext& context) {
   RETURN_IF_ERROR(find_idle_genes(config, workers, context, &summary));
   console.result(describe(config, summary, workers), to_json(config, summary, workers));
   if (summary.evaluated.outcome() == v1::WORKER_FAILED) return kExitQuarantined;
-  return summary.idle.empty() ? kExitDone : kExitBadUsage;
+  return summary.idle.empty() && !has_failed(summary.evaluated) ? kExitDone : kExitBadUsage;
 }
 
 }  // namespace
