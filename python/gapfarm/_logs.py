@@ -39,7 +39,7 @@ def read_trials(file: Path) -> pd.DataFrame:
 
     session, trial, t (s since the session began), command, left and right (duties), duration (s),
     start pose x0, y0 (m), theta0 (rad), end pose x1, y1 (m), theta1 (rad), and further columns as the
-    file has them.
+    file has them. Nothing is checked: `gapfarm check` says what is wrong with a log.
     """
     table = read_table(file, comment="#", dtype={"session": str, "command": str})
     return _with_units(table, TRIAL_UNITS)
