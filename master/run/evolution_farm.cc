@@ -130,6 +130,7 @@ void FarmProgressWriter::on_generation(const GenerationRecord& record, std::opti
 }
 
 void FarmProgressWriter::on_failures(const std::string& text) {
+  failure_ = text;
   if (failures_++ == 0) {
     watcher_.note(text);
   } else if (log_ != nullptr) {

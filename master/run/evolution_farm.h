@@ -67,6 +67,7 @@ class FarmProgressWriter {
   void on_generation(const GenerationRecord& record, std::optional<double> best);
   // Evaluations of the generation in work that a user's program had no answer to, in a sentence.
   void on_failures(const std::string& text);
+  const std::string& failure() const { return failure_; }  // the last of these; empty: none
   // As last shown, with the farm's counts as they are now.
   Progress now() const;
   // Where generations also go, and what is written when the live row is; neither is owned.
@@ -93,6 +94,7 @@ class FarmProgressWriter {
   Log* log_ = nullptr;
   FarmEventKeeper* events_ = nullptr;
   unsigned failures_ = 0;  // generations with some
+  std::string failure_;
   WorkerWait wait_;
 };
 

@@ -167,6 +167,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   if (!evolved) return stopped_by(store, evolved.error(), progress.now());
   RunSummary summary;
   summary.evolved = *std::move(evolved);
+  summary.failure = progress.failure();
   summary.evolved.text += without_best(summary.evolved);
   const RunState state = summary.stopped() ? RunState::kStopped : RunState::kFinished;
   RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));

@@ -47,7 +47,8 @@ struct RunSummary {
   EvolveSummary evolved;
   // Tasks given up, by this master and those before it.
   std::uint64_t given_up = 0;
-  std::size_t held_out = 0;         // trials or windows
+  std::string failure;       // the last evaluations that a program had no answer to, in a sentence
+  std::size_t held_out = 0;  // trials or windows
   std::vector<ScoreRow> validated;  // on those
   // Left in the run's folder; none where the run was stopped, or nothing ended well.
   std::vector<std::string> files;

@@ -51,6 +51,14 @@ StoredIndividual individual_of(const SqlStatement& row, int at) {
   return individual;
 }
 
+// The first of these, which are best first, unless not even that one ended well.
+std::optional<StoredIndividual> best_of(std::vector<StoredIndividual> members) {
+  if (members.empty()) return {};
+  StoredIndividual& best = members.front();
+  if (best.outcome != "OK" && best.outcome != "INFEASIBLE") return {};
+  return std::move(best);
+}
+
 StoredGeneration generation_of(const SqlStatement& row) {
   StoredGeneration g;
   std::string operators;
@@ -184,8 +192,7 @@ Result<std::optional<StoredIndividual>> RunReader::best() const {
       database_.integer("SELECT max(generation) FROM generations", "read the generations"));
   ASSIGN_OR_RETURN(std::vector<StoredIndividual> all,
                    individuals(static_cast<std::uint64_t>(last)));
-  if (all.empty()) return std::optional<StoredIndividual>{};
-  return std::optional<StoredIndividual>(std::move(all.front()));
+  return best_of(std::move(all));
 }
 
 Result<std::vector<Incident>> RunReader::incidents() const {
@@ -266,9 +273,8 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.quarantined += incident.kind == IncidentKind::kQuarantine && !counted ? 1 : 0;
   }
   // By number, not "the last": another generation may have been committed meanwhile.
-  ASSIGN_OR_RETURN(const std::vector<StoredIndividual> members,
-                   reader.individuals(status.generation));
-  if (!members.empty()) status.best_individual = members.front();
+  ASSIGN_OR_RETURN(std::vector<StoredIndividual> members, reader.individuals(status.generation));
+  status.best_individual = best_of(std::move(members));
 
   ASSIGN_OR_RETURN(RunFront front, run_front(reader, generations));
   status.front = std::move(front);

@@ -29,7 +29,7 @@ class RunReader {
   Result<std::string> optimiser_state(std::uint64_t generation) const;
   // Best first; empty when there is no such generation.
   Result<std::vector<StoredIndividual>> individuals(std::uint64_t generation) const;
-  // The best of the last generation; none when nothing was committed yet.
+  // The best of the last generation; none when nothing was committed yet, or nothing ended well.
   Result<std::optional<StoredIndividual>> best() const;
   // In the order in which they happened.
   Result<std::vector<Incident>> incidents() const;

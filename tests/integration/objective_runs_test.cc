@@ -152,7 +152,12 @@ TEST_F(ObjectiveRuns, WhenNothingEndsWellTheRunSaysSo) {
   const Finished finished = evolve(config("    answer['value'] = None\n"), "run", "2");
   EXPECT_EQ(finished.exit_code, 1) << finished.err;
   EXPECT_THAT(finished.out, HasSubstr("no evaluation ended well"));
-  EXPECT_THAT(screen("run"), HasSubstr("no evaluation ended well"));
+  EXPECT_THAT(finished.err, HasSubstr("there is no model: "));
+  EXPECT_THAT(finished.err.substr(finished.err.find("there is no model")),
+              HasSubstr("it answered a value of null"));
+  EXPECT_THAT(screen("run"),
+              AllOf(HasSubstr("no evaluation ended well"), Not(HasSubstr("best  "))));
+  EXPECT_FALSE(status("run").contains("best"));
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "run" / "model.toml"));
 }
 

@@ -196,7 +196,9 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   if (summary->given_up == 0) {
     const auto& best = summary->evolved.best;
     if (!best || best->outcome == v1::OK) return kExitDone;
-    context.console.note("there is no model; what happened: gapfarm status " + shell_quoted(run));
+    const std::string why = summary->failure.empty() ? "" : ": " + summary->failure;
+    context.console.note("there is no model" + why + "; what happened: gapfarm status " +
+                         shell_quoted(run));
     return kExitFailed;
   }
   context.console.note(fmt::format(
