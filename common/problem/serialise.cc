@@ -155,7 +155,9 @@ Status check_window(const Trial& trial, const Problem& problem, const std::strin
   const CommandedRun& run = problem.runs[*trial.run];
   if (run.commands.empty() || !(*trial.t_s >= run.start_s) || !(*trial.duration_s > 0) ||
       !(*trial.t_s + *trial.duration_s - run.start_s < kLongest_s)) {
-    return invalid(where + ": does not lie in its run");
+    return invalid(where +
+                   ": does not lie in its run, or ends 1e5 s or more after it began; name "
+                   "runs apart where nothing was driven");
   }
   return {};
 }

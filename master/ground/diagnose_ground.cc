@@ -110,7 +110,7 @@ Result<GroundDiagnosis> diagnose_by(const GroundRobot& robot, const RunLog& log,
 
 Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& logged,
                                         const GroundDiagnoseOptions& options) {
-  const RunChecks checks = check_runs(logged);
+  const RunChecks checks = check_runs(logged, robot.motors.command_timeout_s);
   if (checks.none_is_left(logged)) {
     return Error{joined(checks.findings, " ",
                         [](const SanityFinding& f) { return f.text + " " + f.remedy; })};
@@ -166,7 +166,7 @@ std::vector<SanityFinding> wrong_way_round(const GroundRobot& robot, const RunLo
 }  // namespace
 
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
-  RunChecks checks = check_runs(log);
+  RunChecks checks = check_runs(log, robot.motors.command_timeout_s);
   if (checks.none_is_left(log)) return checks.findings;
   const RunLog useful = without(log, checks);
   std::vector<SanityFinding> findings = wrong_way_round(robot, useful);

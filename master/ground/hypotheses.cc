@@ -8,6 +8,7 @@
 #include "common/base/ranges.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/fit/window_set.h"
+#include "master/ground/put_right.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -27,27 +28,6 @@ std::vector<std::pair<std::size_t, std::size_t>> channel_pairs(const GroundRobot
     }
   }
   return pairs;
-}
-
-// L (x, y, theta), the heading `turn` (rad) less; of relative poses L of each increment, whose
-// noise goes with it.
-std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn = 0) {
-  const auto changed = [L, turn](const Pose& X) {
-    const Eigen::Vector3d v = L * Eigen::Vector3d(X.x, X.y, X.theta);
-    return Pose{v[0], v[1], turn == 0 ? v[2] : wrap_angle(v[2] - turn)};
-  };
-  return [L, changed](RunLog* log) {
-    for (LoggedRun& run : log->runs) {
-      Pose before, after;
-      for (PoseRow& row : run.poses) {
-        const Pose logged = row.X_WM;
-        row.X_WM = log->relative ? after * changed(between(before, logged)) : changed(logged);
-        if (row.noise) *row.noise = (L * *row.noise * L.transpose()).eval();
-        before = logged;
-        after = row.X_WM;
-      }
-    }
-  };
 }
 
 class Catalogue {
@@ -133,6 +113,11 @@ void Catalogue::wrong_commands() {
           "the sign of " + channel, "Turn the sign of that column.",
           change_commands([c](std::vector<double>& v) { v[c] *= -1; }));
   }
+  if (const auto& timeout_s = robot_.motors.command_timeout_s) {
+    fault("command_timeout", {"commands_on_change"},
+          "commands that hold until the next (their log keeps changes alone)",
+          "Give no cmd_vel_timeout with such a log.", hold_commands(*timeout_s));
+  }
   for (const CommandUnit& unit : kCommandUnits) {
     if (unit.of != robot_.command) continue;
     const auto of_it = mapped(robot_.channels, [&](const std::string& channel) {
@@ -153,6 +138,9 @@ void Catalogue::wrong_poses() {
   };
   fault("heading_flipped", {"heading_sign"}, "the sign of the headings", "Turn the sign of theta.",
         change_poses(diagonal(1, 1, -1)));
+  fault("heading_flipped", {"heading_offset"}, "headings that count clockwise from north (y)",
+        "Take theta from pi / 2.", change_poses(diagonal(1, 1, -1), -pi / 2))
+      .of_world = true;
   fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
         "Turn the sign of y, and that of theta when it follows the robot's turns the wrong way.",
         change_poses(diagonal(1, -1, 1)));
@@ -304,14 +292,6 @@ void Catalogue::floors() {
 }
 
 }  // namespace
-
-std::function<void(RunLog*)> change_commands(std::function<void(std::vector<double>&)> change) {
-  return [change = std::move(change)](RunLog* log) {
-    for (LoggedRun& run : log->runs) {
-      for (CommandRow& row : run.commands) change(row.values);
-    }
-  };
-}
 
 std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
                                                 const std::vector<KinematicRow>& rows) {

@@ -39,9 +39,6 @@ struct GroundHypothesis {
   double radians = 1;      // logged headings times this are radians
 };
 
-// Changes the values of every row of commands.
-std::function<void(RunLog*)> change_commands(std::function<void(std::vector<double>&)> change);
-
 // Standard deviation of a value that is wrong (kPlausibleErrors).
 double plausible_error(const KinematicRow& row);
 

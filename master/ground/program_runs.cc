@@ -9,6 +9,7 @@
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "master/ground/put_right.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
 

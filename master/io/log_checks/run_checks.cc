@@ -17,6 +17,7 @@ namespace {
 constexpr double kNoMove_m = 0.2;
 constexpr double kLeastGap_s = 10;  // twice the longest windows
 constexpr double kTimesUsualGap = 50;
+constexpr double kManyStale = 0.1;  // of the time that a robot is commanded to drive
 // Of a step, over what four in five are and over those about it: no robot gathers speed so fast.
 constexpr double kTimesUsualStep = 20;
 constexpr double kLeastJump_m = 0.1;  // coarse grids step by less, with none in between
@@ -232,12 +233,36 @@ void add_gaps(const RunLog& log, RunChecks* checks) {
                               "Number what follows a gap as another run.", Severity::kNote});
 }
 
+void add_stale_commands(const RunLog& log, double timeout_s, RunChecks* checks) {
+  double all_s = 0, stale_s = 0;
+  for (const LoggedRun& run : log.runs) {
+    for (std::size_t i = 1; i < run.commands.size(); ++i) {
+      const CommandRow& row = run.commands[i - 1];
+      if (std::ranges::all_of(row.values, [](double v) { return v == 0; })) continue;
+      const double held_s = run.commands[i].t_s - row.t_s;
+      all_s += held_s;
+      stale_s += std::max(0.0, held_s - timeout_s);
+    }
+  }
+  if (!(stale_s > kManyStale * all_s)) return;
+  checks->findings.push_back(
+      {"stale_commands",
+       "For " + few_digits(100 * stale_s / all_s) +
+           " % of the time that it is commanded to drive the last command is older than the "
+           "robot's cmd_vel_timeout (" +
+           few_digits(timeout_s) + " s), when a robot stops.",
+       "If it drove on, log all commands; or, where the log keeps changes alone, remove "
+       "cmd_vel_timeout from the robot's file.",
+       Severity::kNote});
+}
+
 }  // namespace
 
-RunChecks check_runs(const RunLog& log) {
+RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s) {
   RunChecks checks;
   add_useless_runs(log, &checks);
   add_gaps(log, &checks);
+  if (timeout_s) add_stale_commands(log, *timeout_s, &checks);
   return checks;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -23,8 +24,9 @@ struct RunChecks {
 };
 
 // Runs whose poses never change though the robot is commanded to drive, that move though nothing is
-// commanded, and that are another one's copy; stretches without any pose.
-RunChecks check_runs(const RunLog& log);
+// commanded, and that are another one's copy; stretches without any pose; commands that are older
+// than the robot's timeout.
+RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s = {});
 
 // Poses that the tracker took from elsewhere, for they jump there and back.  REQUIRES: headings in
 // radians.

@@ -167,6 +167,8 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
          for (CommandRow& row : run.commands) std::swap(row.values[0], row.values[1]);
        })},
       {"heading_flipped", poses([](Pose& X) { X.theta = -X.theta; })},
+      {"heading_flipped",  // as a compass counts
+       poses([](Pose& X) { X.theta = wrap_angle(std::numbers::pi / 2 - X.theta); })},
       {"axes_mirrored", poses([](Pose& X) { X.y = -X.y; })},
       {"unit_error", poses([](Pose& X) {
          X.x *= 1000;
@@ -183,6 +185,19 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
     ASSERT_EQ(found.diagnosis.effects.size(), 1u) << name << ": " << found.diagnosis.headline;
     EXPECT_EQ(found.diagnosis.effects.front().name, name);
   }
+}
+
+// A command a second, and the robot drives on between them.
+TEST(DiagnoseGround, ATimeoutThatLoggedCommandsOutlastIsNamed) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const RunLog log = driven(robot, {});
+  GroundRobot careful = robot;
+  careful.motors.command_timeout_s = 0.5;
+  const auto names = mapped(check_ground_log(careful, log), &SanityFinding::name);
+  EXPECT_EQ(names, (std::vector<std::string>{"command_timeout", "stale_commands"}));
+  const Diagnosis found = diagnosis_of(careful, log).diagnosis;
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  EXPECT_EQ(found.effects.front().name, "command_timeout");
 }
 
 TEST(DiagnoseGround, ARunThatIsTheOtherWayRoundAloneIsNamed) {

@@ -73,6 +73,9 @@ TEST(RunChecks, ARobotThatStandsByCommandIsNoMistake) {
   for (CommandRow& row : log.runs[0].commands) row.values = {0, 0};
   for (PoseRow& row : log.runs[0].poses) row.X_WM = {1, 2, 3};
   EXPECT_TRUE(check_runs(log).findings.empty());
+  EXPECT_TRUE(check_runs(log, 12.0).findings.empty());
+  ASSERT_EQ(check_runs(log, 6.0).findings.size(), 1u);  // 12 s by one command
+  EXPECT_EQ(check_runs(log, 6.0).findings[0].name, "stale_commands");
 }
 
 TEST(RunChecks, PosesFromElsewhereAreOmitted) {

@@ -1,0 +1,52 @@
+#include "master/ground/put_right.h"
+
+#include <utility>
+
+namespace gapfarm {
+
+std::function<void(RunLog*)> change_commands(std::function<void(std::vector<double>&)> change) {
+  return [change = std::move(change)](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      for (CommandRow& row : run.commands) change(row.values);
+    }
+  };
+}
+
+std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn) {
+  const auto changed = [L, turn](const Pose& X) {
+    const Eigen::Vector3d v = L * Eigen::Vector3d(X.x, X.y, X.theta);
+    return Pose{v[0], v[1], turn == 0 ? v[2] : wrap_angle(v[2] - turn)};
+  };
+  return [L, changed](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      Pose before, after;
+      for (PoseRow& row : run.poses) {
+        const Pose logged = row.X_WM;
+        row.X_WM = log->relative ? after * changed(between(before, logged)) : changed(logged);
+        if (row.noise) *row.noise = (L * *row.noise * L.transpose()).eval();
+        before = logged;
+        after = row.X_WM;
+      }
+    }
+  };
+}
+
+std::function<void(RunLog*)> hold_commands(double step_s) {
+  return [step_s](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      std::vector<CommandRow> held;
+      for (std::size_t i = 0; i < run.commands.size(); ++i) {
+        const CommandRow& row = run.commands[i];
+        const double last_s = run.poses.empty() ? row.t_s : run.poses.back().t_s;
+        const double end_s = i + 1 < run.commands.size() ? run.commands[i + 1].t_s : last_s;
+        double t_s = row.t_s;
+        do {
+          held.push_back({t_s, row.values});
+        } while ((t_s += step_s) < end_s);
+      }
+      run.commands = std::move(held);
+    }
+  };
+}
+
+}  // namespace gapfarm
