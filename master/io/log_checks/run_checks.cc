@@ -15,6 +15,9 @@ namespace {
 
 // Nine tenths of a run's poses lie within it of their middle: a tracker's noise.
 constexpr double kNoMove_m = 0.2;
+// No robot that drives is slower than both, a hundredth of its steps aside.
+constexpr double kSlow_m_s = 5e-3, kSlow_rad_s = 5e-3;
+constexpr std::size_t kFewestSteps = 10;
 constexpr double kLeastGap_s = 10;  // twice the longest windows
 constexpr double kTimesUsualGap = 50;
 constexpr double kManyStale = 0.1;  // of the time that a robot is commanded to drive
@@ -46,6 +49,17 @@ bool travels(const LoggedRun& run) {
   return quantile(from_middle(mapped(run.poses, &PoseRow::X_WM)), 0.9) > kNoMove_m;
 }
 
+bool is_slow(const LoggedRun& run) {
+  std::vector<double> speeds;  // 1 at either limit
+  for (std::size_t i = 1; i < run.poses.size(); ++i) {
+    const PoseRow &a = run.poses[i - 1], &b = run.poses[i];
+    const Pose X_AB = between(a.X_WM, b.X_WM);
+    const double way = std::hypot(X_AB.x, X_AB.y) / kSlow_m_s;
+    speeds.push_back(std::max(way, std::abs(X_AB.theta) / kSlow_rad_s) / (b.t_s - a.t_s));
+  }
+  return speeds.size() >= kFewestSteps && quantile(speeds, 0.99) < 1;
+}
+
 bool same_poses(const LoggedRun& a, const LoggedRun& b) {
   return std::ranges::equal(a.poses, b.poses, {}, &PoseRow::X_WM, &PoseRow::X_WM);
 }
@@ -64,7 +78,7 @@ struct Places {
 };
 
 void add_useless_runs(const RunLog& log, RunChecks* checks) {
-  Places still, driverless, copies;
+  Places still, driverless, slow, copies;
   for (std::size_t r = 0; r < log.runs.size(); ++r) {
     const LoggedRun& run = log.runs[r];
     const auto is_copied = [&](std::size_t other) { return same_poses(run, log.runs[other]); };
@@ -73,6 +87,7 @@ void add_useless_runs(const RunLog& log, RunChecks* checks) {
     Places* of = nullptr;
     if (never_moves(run) && is_commanded(run)) of = &still;
     if (!is_commanded(run) && travels(run) && !log.relative) of = &driverless;
+    if (of == nullptr && is_commanded(run) && is_slow(run)) of = &slow;
     if (first < r && run.poses.size() > 1 && of == nullptr) of = &copies;
     if (of == nullptr) continue;
     of->add([&] {
@@ -89,6 +104,9 @@ void add_useless_runs(const RunLog& log, RunChecks* checks) {
          "Log these runs again: the tracker stood still, or the robot. They are omitted.");
   report(driverless, "uncommanded_runs", "Every command is 0, though the robot travels: ",
          "Log the commands that it was driven by. These runs are omitted.");
+  report(slow, "slow_runs",
+         "The robot is slower than 5 mm/s and 5 mrad/s all the time, as if times were in ms: ",
+         "Write times in s. These runs are omitted.");
   report(copies, "repeated_runs",
          "Every pose is another run's: ", "Name each run once. The copies are omitted.");
 }

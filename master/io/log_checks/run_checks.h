@@ -23,9 +23,9 @@ struct RunChecks {
   }
 };
 
-// Runs whose poses never change though the robot is commanded to drive, that move though nothing is
-// commanded, and that are another one's copy; stretches without any pose; commands that are older
-// than the robot's timeout.
+// Runs whose poses never change, or crawl, though the robot is commanded to drive, that move though
+// nothing is commanded, and that are another one's copy; stretches without any pose; commands that
+// are older than the robot's timeout.
 RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s = {});
 
 // Poses that the tracker took from elsewhere, for they jump there and back.  REQUIRES: headings in

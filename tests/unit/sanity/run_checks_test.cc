@@ -78,6 +78,15 @@ TEST(RunChecks, ARobotThatStandsByCommandIsNoMistake) {
   EXPECT_EQ(check_runs(log, 6.0).findings[0].name, "stale_commands");
 }
 
+TEST(RunChecks, TimesInMillisecondsAreNoTimes) {
+  RunLog log = two_runs();
+  for (CommandRow& row : log.runs[1].commands) row.t_s *= 1000;
+  for (PoseRow& row : log.runs[1].poses) row.t_s *= 1000;
+  const RunChecks checks = check_runs(log);
+  EXPECT_EQ(checks.useless, (std::vector<std::size_t>{1}));
+  EXPECT_TRUE(contains(checks.findings, "slow_runs", &SanityFinding::name));
+}
+
 TEST(RunChecks, PosesFromElsewhereAreOmitted) {
   for (const Pose& origin : {Pose{3, -4, 0}, Pose{5.4e5, 5.2e6, 3}}) {
     RunLog log = two_runs(origin);
