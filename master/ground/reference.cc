@@ -12,6 +12,7 @@
 #include "common/random/stream.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/tolerances.h"
+#include "master/io/log_checks/run_checks.h"
 
 namespace gapfarm {
 namespace {
@@ -245,6 +246,9 @@ bool shares_a_clock(const RunLog& log) {
 
 Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
                                  const WindowSettings& settings) {
+  if (const RunChecks checks = check_runs(log); checks.none_is_left(log)) {
+    return Error{checks.findings.front().text};
+  }
   GroundQuestion question;
   question.rows = change_rows(robot);
   question.catalogue = change_hypotheses(robot, question.rows);
@@ -262,6 +266,9 @@ Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
   const WindowFit fit = open_fit(fitter, robot, question.rows, log);
   if (const GroundHypothesis* h = fault_of(robot, log, settings, question, fitter, fit)) {
     return Error{"its log is wrong in " + h->thing + ". " + h->remedy};
+  }
+  if (const RunChecks jumps = check_jumps(log); !jumps.false_poses.empty()) {
+    return fit_run_values(robot, without(log, jumps), settings);
   }
   return fitter.fit_with_offsets(fit);
 }
