@@ -157,7 +157,7 @@ Status check_window(const Trial& trial, const Problem& problem, const std::strin
       !(*trial.t_s + *trial.duration_s - run.start_s < kLongest_s)) {
     return invalid(where +
                    ": does not lie in its run, or ends 1e5 s or more after it began; name "
-                   "runs apart where nothing was driven");
+                   "runs apart where nothing was driven, and write times in s");
   }
   return {};
 }

@@ -294,7 +294,10 @@ class Completion {
     const bool made = find("front") == nullptr;
     RobotWheel& front = ensure("front");
     place(front, *k.wheelbase_m, 0);
-    if (made) front.steered = true;
+    if (made) {
+      front.steered = true;
+      assume("the front wheel drives (where the others do, give all three in [wheels.NAME])");
+    }
     for (const char* name : {"rear_left", "rear_right"}) {
       const bool fresh = find(name) == nullptr;
       RobotWheel& w = ensure(name);

@@ -53,7 +53,8 @@ struct ColumnNumber {
 constexpr ColumnNumber kNumbers[] = {{"scale", &MappedColumn::scale, 0, 1e12},
                                      {"offset", &MappedColumn::offset, -1e12, 1e12},
                                      {"sign", &MappedColumn::sign, -1, 1},
-                                     {"gear", &MappedColumn::gear, 1e-6, 1e6}};
+                                     {"gear", &MappedColumn::gear, 1e-6, 1e6},
+                                     {"wraps", &MappedColumn::wraps, 0, 1e12}};
 
 // As TOML's basic string.  Bags may hold any bytes: what TOML cannot hold becomes '_'.
 std::string quoted(const std::string& text) {

@@ -19,6 +19,7 @@ struct MappedColumn {
   double offset = 0;   // in the unit
   double sign = 1;     // or -1: an axis or a motor that counts the other way
   double gear = 1;     // turns of a motor a turn of its wheel
+  double wraps = 0;    // a counter begins anew at this many; 0: it never does
   bool rate = false;   // the column counts (an encoder's position): its change a second is meant
   bool increment = false;  // the column is what that count changed by since the row before
 };

@@ -12,6 +12,7 @@
 #include "common/recordings/increment_noise.h"
 #include "common/recordings/read.h"
 #include "common/trials/text/csv.h"
+#include "master/io/logs/column_units.h"
 
 namespace gapfarm {
 namespace {
@@ -129,53 +130,21 @@ class Importer {
     return {};
   }
 
-  // What a column's numbers become in SI.
-  struct Line {
-    double slope, offset;
-  };
-
-  // The map's unit, else the file's where the map does not say what one of the column is.
-  static Result<std::string> unit_of(const LogTable& table, const MappedColumn& c) {
-    if (!c.unit.empty() || c.scale != 1) return c.unit;
-    const std::string own = table.unit_of(c.column);
-    const bool none = own.empty() || own == "-";
-    if (none || unit_factor(own) != 0) return none ? "" : own;
-    const std::string role = c.role + " = { column = \"" + c.column + "\", ";
-    return text_error(table.source, table.units[*table.find(c.column)].place,
-                      "unit " + quoted_word(own) + " of column " + quoted_word(c.column),
-                      "one of s, ms, m, mm, rad, deg, rad/s, rpm, ... (docs/formats.md)" +
-                          suggestion(own, known_units()),
-                      "say in the map what one of it is in SI: " + role + "scale = 0.001 }, or " +
-                          role + "unit = \"...\" }");
-  }
-
-  // Speeds of rims become those of wheels.
-  Result<Line> line_of(const LogTable& table, const TableMap& map, const MappedColumn& c,
-                       bool poses) const {
-    const Result<std::string> unit = unit_of(table, c);
-    if (!unit) return unit.error();
-    double factor = unit_factor(*unit);
-    const bool length = *unit == "m" || *unit == "cm" || *unit == "mm";
-    const bool speed = unit->ends_with("/s") && unit->find("m/") != unit->npos;
-    const bool rim = !poses && (speed || (c.rate && length)) && c.role != "v" && c.role != "vy";
-    if (rim && map.wheel_radius_m <= 0) {
-      return Error{table.source + ":1: found column " + quoted_word(c.column) + " in " + *unit +
-                   ", expected the wheels' radius too; print the map (--print-map), add "
-                   "wheel_radius = 0.05 (m) to it and give it by --map"};
-    }
-    if (rim) factor /= map.wheel_radius_m;
-    return Line{c.sign * c.scale / c.gear * factor, c.offset * factor};
-  }
-
   Status take_table(std::size_t recording, const LogTable& table, const Kind& kind) {
     const TableMap& map = *kind.map;
     const bool poses = kind.map == &map_.poses;
     std::vector<std::size_t> at;
-    std::vector<Line> lines;
+    std::vector<SiLine> lines;
     for (const MappedColumn& c : map.columns) {
       at.push_back(*table.find(c.column));
-      ASSIGN_OR_RETURN(const auto line, line_of(table, map, c, poses));
+      ASSIGN_OR_RETURN(const auto line, si_line(table, map, c, poses));
       lines.push_back(line);
+      if (c.rate && c.wraps == 0 && seems_to_wrap(table, at.back())) {
+        out_.report.push_back(
+            "column " + c.column +
+            " steps by more than half of its range: if its counter wraps, write wraps = (how many "
+            "it counts to) for it in the map");
+      }
     }
     std::optional<std::size_t> run, keep;
     for (const auto& [name, to] : {std::pair{&map.run, &run}, {&map.keep, &keep}}) {
@@ -186,16 +155,26 @@ class Importer {
                      ", expected it for [" + kind.name + "]" + suggestion(*name, table.columns)};
       }
     }
+    std::vector<double> counts(at.size(), NAN);
     std::map<std::string, std::vector<double>> before;  // of each run: its last row
     Tally& tally = tallies_[kind.name];
+    const std::set<std::size_t> broken = broken_rows(table);
+    std::size_t part = 0;
     for (std::size_t r = 0; r < table.rows(); ++r) {
+      if (broken.contains(r)) {
+        ++part;
+        ++tally.blank;
+        continue;
+      }
       if (keep && !(table.at(r, *keep) != 0)) {
         ++tally.dropped;
         continue;
       }
       std::vector<double> values;
       for (std::size_t c = 0; c < at.size(); ++c) {
-        values.push_back(lines[c].slope * table.at(r, at[c]) + lines[c].offset);
+        const double count = counted_on(map.columns[c].wraps, counts[c], table.at(r, at[c]));
+        values.push_back(lines[c].slope * count + lines[c].offset);
+        if (std::isfinite(count)) counts[c] = count;
       }
       const bool whole = std::all_of(values.begin(), values.end(),
                                      [](double v) { return std::abs(v) < kGreatest; });
@@ -204,7 +183,7 @@ class Importer {
         ++tally.blank;
         continue;
       }
-      const std::string name = run_name(table, run, r);
+      const std::string name = run_name(table, run, r, part);
       if (poses && values.size() > 4 && (map.intervals || before.count(name) != 0)) {
         if (const auto fault = fault_of_noise(std::span(values).subspan(4))) {
           return Error{table.source + ": found " + fault->found + " in row " +
@@ -226,9 +205,27 @@ class Importer {
                  "lies before and behind it apart by a column and say run = \"COLUMN\" in the map"};
   }
 
+  // Where each row leads on from the row before, those without a number of theirs part the run;
+  // none where a kind has a table of its own, which would not be parted with it.
+  std::set<std::size_t> broken_rows(const LogTable& table) const {
+    std::set<std::size_t> broken;
+    for (const Kind& kind : kinds()) {
+      if (!has_all(table, *kind.map)) return {};
+      if (!kind.map->increments && !kind.map->intervals) continue;
+      for (const MappedColumn& c : kind.map->columns) {
+        for (std::size_t r = 0; r < table.rows(); ++r) {
+          if (!std::isfinite(table.at(r, *table.find(c.column)))) broken.insert(r);
+        }
+      }
+    }
+    return broken;
+  }
+
   static std::string run_name(const LogTable& table, const std::optional<std::size_t>& run,
-                              std::size_t row) {
-    return run ? format_double(table.at(row, *run)) : "";
+                              std::size_t row, std::size_t part) {
+    const std::string name = run ? format_double(table.at(row, *run)) : "";
+    if (part == 0) return name;
+    return (name.empty() ? "part" : name) + "_" + std::to_string(part);
   }
 
   void put(Tally& tally, Stretch& stretch, std::vector<double> values) {

@@ -143,11 +143,42 @@ TEST(Tables, IncrementsAreChainedFromWhereEachStretchBegins) {
   EXPECT_THAT(same->log.runs[0].commands[0].values, ElementsAre(2, 4));
   EXPECT_NEAR(same->log.runs[0].poses[2].X_WM.y, 1, 1e-12);
   // A row without its increment parts what lies before from what lies behind.
-  const auto broken = to_runs({table_of("dt,l,r,x,y,a\n1,1,1,1,0,0\n1,1,1,,0,0\n")}, *map);
+  const auto parted = to_runs(
+      {table_of("dt,l,r,x,y,a\n1,1,1,1,0,0\n1,1,1,,0,0\n1,2,2,2,0,0\n1,2,2,2,0,0\n")}, *map);
+  ASSERT_TRUE(parted) << parted.error().message;
+  ASSERT_EQ(parted->log.runs.size(), 2u);
+  for (const LoggedRun& part : parted->log.runs) {
+    const double moved_m = part.commands.front().values[0];  // a row's in either part
+    EXPECT_EQ(part.commands.size(), static_cast<std::size_t>(moved_m));
+    EXPECT_EQ(part.poses.size(), part.commands.size() + 1);
+    EXPECT_EQ(part.poses[1].X_WM.x, moved_m);
+  }
+  // Not where the wheels have a table of their own.
+  const auto broken =
+      to_runs({table_of("dt,x,y,a\n1,1,0,0\n1,,0,0\n"), table_of("dt,l,r\n1,1,1\n1,1,1\n")}, *map);
   ASSERT_FALSE(broken);
   EXPECT_THAT(broken.error().message, HasSubstr("row 2"));
   EXPECT_FALSE(parse_map("[poses]\ndt = \"dt\"\nkeep = \"k\"\n" + poses, "m.toml"));
   EXPECT_FALSE(parse_map("[wheels]\ndt = \"dt\"\nl = { column = \"l\", rate = true }\n", "m.toml"));
+}
+
+TEST(Tables, CountersThatBeginAnewCountOn) {
+  const std::string poses = "[poses]\nt = \"t\"\nx = \"x\"\ny = \"x\"\ntheta = \"x\"\n";
+  const std::string count = "[commands]\nt = \"t\"\nv = { column = \"n\", rate = true";
+  std::string log = "t,n,x\n";
+  for (int t = 0; t < 60; ++t) {
+    log += std::to_string(t) + "," + std::to_string(15 * t % 100) + ",0\n";
+  }
+  const auto map = parse_map(poses + count + ", wraps = 100 }\n", "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_EQ(format_map(*parse_map(format_map(*map), "m.toml")), format_map(*map));
+  const auto runs = to_runs({table_of(log)}, *map);
+  ASSERT_TRUE(runs) << runs.error().message;
+  for (const CommandRow& row : runs->log.runs.at(0).commands) EXPECT_EQ(row.values[0], 15);
+  EXPECT_THAT(runs->report, Not(Contains(HasSubstr("wraps"))));
+  const auto unknown = to_runs({table_of(log)}, *parse_map(poses + count + " }\n", "m.toml"));
+  ASSERT_TRUE(unknown) << unknown.error().message;
+  EXPECT_THAT(unknown->report, Contains(HasSubstr("write wraps")));
 }
 
 TEST(Tables, IncrementsKeepTheirCovariancesAndAGyroItsRates) {
