@@ -81,7 +81,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
   search.loop = loop;
   clock.begin(std::end(kGroundStages)[-1].name);
   GroundDiagnosis result = report_ground(robot, search, options);
-  result.corrected = robot_with(file, chosen_values(search));
+  result.corrected = robot_with(file, chosen_values(search, result.values));
   clock.begin("");
   result.diagnosis.timing_s = std::move(clock.timing_s);
   return result;

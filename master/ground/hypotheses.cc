@@ -206,6 +206,8 @@ void Catalogue::steering() {
         {row("steering_offset")});
   value("steering_gain", {"wheelbase"}, "the angle that is steered over the commanded one",
         {row("steering_gain")});
+  value("wheelbase", {"steering_gain"}, "the distance from the steered axle to the other",
+        {{"wheelbase", 1, kSteeringGainShare, "ratio", "-"}});
   value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
         {row("understeer")});
   if (!robot_.steering.table.empty()) {
@@ -257,8 +259,10 @@ void Catalogue::marker() {
 }
 
 void Catalogue::tracker() {
+  // Of increments alone a robot that is smaller in all its sizes shows as much.
   value("pose_scale", {"unit_error", "camera_scale"}, "the scale of all positions",
-        {{"pose_scale", 1, 0.01, "ratio", "-"}});
+        {{"pose_scale", 1, 0.01, "ratio", "-"}})
+      .of_world = true;
   value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}})
       .of_world = true;
 }

@@ -1,8 +1,14 @@
 #include "master/ground/put_right.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace gapfarm {
+namespace {
+
+constexpr double kMostTimes = 10'000;  // a run's clock may have been set in between
+
+}  // namespace
 
 std::function<void(RunLog*)> change_commands(std::function<void(std::vector<double>&)> change) {
   return [change = std::move(change)](RunLog* log) {
@@ -39,10 +45,8 @@ std::function<void(RunLog*)> hold_commands(double step_s) {
         const CommandRow& row = run.commands[i];
         const double last_s = run.poses.empty() ? row.t_s : run.poses.back().t_s;
         const double end_s = i + 1 < run.commands.size() ? run.commands[i + 1].t_s : last_s;
-        double t_s = row.t_s;
-        do {
-          held.push_back({t_s, row.values});
-        } while ((t_s += step_s) < end_s);
+        const double times = std::clamp((end_s - row.t_s) / step_s, 0.0, kMostTimes);
+        for (int k = 0; k <= times; ++k) held.push_back({row.t_s + k * step_s, row.values});
       }
       run.commands = std::move(held);
     }

@@ -326,12 +326,14 @@ std::vector<ReportedValue> GroundReport::reported_values() const {
   std::vector<ReportedValue> values;
   for (std::size_t j = 0; j < search_.rows.size(); ++j) {
     const FitRow& row = search_.rows[j];
+    const double had = row.row.nominal, off = search_.fit.values[j] - had;
+    const Interval interval = {intervals_(j, 0), intervals_(j, 1)};
+    // What fits move without its name predicts as well, but costs as many nats as a name.
+    const bool known = std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
+                       (interval.lower > had || interval.upper < had);
     // Against a reference every value is the two logs' own.
-    values.push_back({row.row.name,
-                      value_in_file(robot_, row.row.name),
-                      search_.fit.values[j],
-                      {intervals_(j, 0), intervals_(j, 1)},
-                      row.free || search_.reference.has_value()});
+    values.push_back({row.row.name, value_in_file(robot_, row.row.name), search_.fit.values[j],
+                      interval, row.free || known || search_.reference.has_value()});
     for (const SensorValue& v : search_.sensor) {
       if (v.row.name != row.row.name) continue;
       values.back() = {v.row.name, v.had, v.value, v.interval, true};
@@ -369,11 +371,11 @@ GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& sear
   return result;
 }
 
-Kinematics chosen_values(const GroundSearch& search) {
+Kinematics chosen_values(const GroundSearch& search, const std::vector<ReportedValue>& values) {
   Kinematics at;
   for (std::size_t j = 0; j < search.rows.size(); ++j) {
-    if (!search.rows[j].free) continue;
-    at.add(search.rows[j].row.name, search.fit.values[j]);
+    const bool named = search.reference ? search.rows[j].free : values[j].named;
+    if (named) at.add(values[j].name, values[j].reported);
   }
   if (search.reference) search.reference->complete(&at);
   Kinematics kept;

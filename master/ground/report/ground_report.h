@@ -10,7 +10,8 @@ namespace gapfarm {
 GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
                               const GroundDiagnoseOptions& options);
 
-// What was chosen, as fitted; what lies before measured wheel speeds is not the file's.
-Kinematics chosen_values(const GroundSearch& search);
+// What was chosen or is known, of report_ground()'s values; what lies before measured wheel speeds
+// is not the file's.
+Kinematics chosen_values(const GroundSearch& search, const std::vector<ReportedValue>& values);
 
 }  // namespace gapfarm

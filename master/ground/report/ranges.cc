@@ -91,7 +91,9 @@ bool is_table(const Json& value) {
 Interval interval_of(const GroundReference& fit, Eigen::Index k) {
   std::vector<double> drawn;
   for (const double off : fit.draws.row(k)) drawn.push_back(fit.values[k] + off);
-  return {quantile(drawn, kLow), quantile(drawn, kHigh)};
+  // Where the draws lead away from the fit, it has not settled.
+  return {std::min(quantile(drawn, kLow), fit.values[k]),
+          std::max(quantile(drawn, kHigh), fit.values[k])};
 }
 
 Ranges ranges_of(const GroundRobot& robot, const GroundReference& fit) {

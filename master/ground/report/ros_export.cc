@@ -17,6 +17,8 @@
 namespace gapfarm {
 namespace {
 
+const double kWidestGrip = std::log(10.0);  // of a 90 % interval, beyond which it says nothing
+
 // A product of ratios that are 1 in the robot's file, times what the file has.
 ReportedValue product(const ReportedValues& reported, const std::string& key, double had,
                       std::initializer_list<const char*> over,
@@ -152,7 +154,7 @@ RosFriction ros_friction(const ReportedValues& reported) {
   const GroundRobot& robot = reported.given;
   RosFriction friction;
   if (const ReportedValue* grip = find_by(reported.values, "grip", &ReportedValue::name);
-      grip != nullptr && grip->named) {
+      grip != nullptr && grip->named && grip->interval.upper - grip->interval.lower < kWidestGrip) {
     friction.across = std::exp(grip->reported) / kGravity_m_s2;
     friction.from = fmt::format("friction across {:.3g} [{:.3g}, {:.3g}], from how hard it corners",
                                 *friction.across, std::exp(grip->interval.lower) / kGravity_m_s2,

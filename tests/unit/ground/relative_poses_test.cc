@@ -6,6 +6,7 @@
 #include <fstream>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/recordings/read.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/io/logs/to_runs.h"
@@ -104,6 +105,67 @@ TEST(RelativePoses, DiagnoseARobotWhoseSensorLooksAnyWay) {
       if (!wheel.driven) continue;
       EXPECT_NEAR(*wheel.radius_m, r, 3e-3 * r) << yaw;
     }
+  }
+}
+
+// It was named another scale of all positions, which increments cannot distinguish from it.
+TEST(RelativePoses, ARobotThatIsLargerInAllItsSizesIsNotSeenByAnotherScale) {
+  GroundRobot robot = robot_by_its_maker();
+  for (RobotWheel& wheel : robot.wheels) {
+    if (wheel.driven) wheel.radius_m = 0.95 * (wheel.side == WheelSide::kLeft ? kLeft_m : kRight_m);
+  }
+  robot.controller.wheel_separation_m = 0.95 * kSeparation_m;
+  const auto found = diagnose_ground(robot, driven(6, 32), {});
+  ASSERT_TRUE(found) << found.error().message;
+  const std::vector<std::string> named = mapped(found->diagnosis.effects, &NamedEffect::name);
+  EXPECT_TRUE(contains(named, "wheel_radius")) << found->diagnosis.headline;
+  EXPECT_FALSE(contains(named, "pose_scale")) << found->diagnosis.headline;
+  EXPECT_NEAR(*found->corrected.controller.wheel_separation_m, kSeparation_m, 5e-3 * kSeparation_m);
+  EXPECT_TRUE(find_by(found->values, "separation", &ReportedValue::name)->named);
+}
+
+// Turns of far steered wheels show the wheelbase beside what a unit of the command steers by; it
+// was taken for what the floor holds, and for the scale of all positions.
+TEST(RelativePoses, CalibrateATricycle) {
+  const Pose X_RS{0.3, 0, -0.5};
+  for (const double stated_m : {1.14, 1.26}) {
+    const GroundRobot robot = *parse_robot(
+        "drive = \"tricycle\"\ncommands = [\"speed\", \"steering\"]\nmeasured = true\n"
+        "wheelbase = " +
+            std::to_string(stated_m) + "\nwheel_radius = 0.1\n",
+        "r.toml");
+    Stream stream({11, Purpose::kTest, 0, 0, 0});
+    RunLog log;
+    log.channels = {"speed", "steering"};
+    log.relative = true;
+    LoggedRun& run = log.runs.emplace_back();
+    run.run = "1";
+    run.poses.push_back({0, {}});
+    for (int k = 0; k < 400; ++k) {
+      const double speed = 2 + 6 * stream.uniform(), angle = 1.8 * stream.uniform() - 0.9;
+      run.commands.push_back({0.5 * k, {speed, angle}});
+      const Twist step(0.05 * speed * std::cos(angle), 0, 0.05 * speed * std::sin(angle) / 1.2);
+      Pose X_SS = inverse(X_RS) * exp(step) * X_RS;
+      X_SS.x += 2e-3 * stream.normal();
+      X_SS.y += 2e-3 * stream.normal();
+      X_SS.theta += 2e-3 * stream.normal();
+      run.poses.push_back({0.5 * (k + 1), run.poses.back().X_WM * X_SS});
+    }
+    const auto asked = ask_what_changed(robot, log, {{kEachRow_s}, 0}, 1, nullptr, /*alone=*/true);
+    ASSERT_TRUE(asked) << asked.error().message;
+    const GroundReference& fit = *asked->reference;
+    const double times = fit.value_or("wheelbase", 1) / fit.value_or("steering_gain", 1);
+    EXPECT_NEAR(stated_m * times, 1.2, 0.012) << stated_m;
+    EXPECT_NEAR(fit.value_or("ahead", 1), 1, 2e-3);
+  }
+}
+
+// It was asked to swap its sides, by ten nats of luck.
+TEST(RelativePoses, StraightAheadNothingIsTheWrongWayRound) {
+  for (std::uint64_t seed = 40; seed < 42; ++seed) {
+    const auto asked = ask_what_changed(robot_by_its_maker(), driven(4, seed, kSensor, false),
+                                        {{kEachRow_s}, 0}, 1, nullptr, /*alone=*/true);
+    EXPECT_TRUE(asked) << seed << ": " << asked.error().message;
   }
 }
 
