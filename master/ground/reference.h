@@ -24,9 +24,9 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
 Status settle_sensor(const GroundRobot& robot, const WindowSettings& settings, std::uint64_t seed,
                      RunLog* log, GroundQuestion* question);
 
-// The values of change_rows() and of command_offsets() by one log alone; their covariance is by its
-// own scatter, without poses that the tracker took from elsewhere.  Errors: as ask_what_changed(); too
-// few windows; a log that says nothing (check_runs()).
+// The values of change_rows() and of command_offsets() by one log alone, without poses that the
+// tracker took from elsewhere; their covariance is by its own scatter.  Errors: as
+// ask_what_changed(); too few windows; a log that says nothing (check_runs()).
 Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
                                  const WindowSettings& settings);
 
