@@ -354,7 +354,9 @@ std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<Groun
     const std::string other =
         log.relative ? "a sensor that is mounted upside down" : "y and headings both mirrored";
     h.thing += " (or " + other + ")";
-    h.remedy += " If it is " + other + ", turn the signs of y and theta instead.";
+    h.remedy +=
+        " If it is " + other +
+        ", turn the signs of y and theta instead, and diagnose again: other values hold then.";
     h.aliases.emplace_back(log.relative ? "sensor_upside_down" : "axes_mirrored");
   }
   GroundHypothesis gyro{kGyroScale, {}, "the scale of the gyro", {}};

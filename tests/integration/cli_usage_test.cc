@@ -178,6 +178,15 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   const Finished checked = gapfarm_command({"check", folder / "car.toml"});
   EXPECT_EQ(checked.exit_code, 0) << checked.err;
   EXPECT_THAT(checked.out, HasSubstr("car.toml: fine\n"));
+  // What can be diagnosed and exported can be checked.
+  const Finished bare = gapfarm_command(
+      {"check", folder.write("bare.toml",
+                             "scenario = \"ground\"\n[robot]\nfile = \"car_robot.toml\"\n"
+                             "[runs]\nfolders = [\"monday\"]\n")});
+  EXPECT_EQ(bare.exit_code, 0) << bare.err;
+  EXPECT_THAT(bare.out, HasSubstr("bare.toml: fine\n"));
+  EXPECT_THAT(bare.out, HasSubstr("nothing can be evolved"));
+  EXPECT_EQ(gapfarm_command({"check", folder / "bare.toml", "--json"}).exit_code, 0);
   const Finished dry = gapfarm_command({"horizons", folder / "car.toml", "--dry-run"});
   EXPECT_EQ(dry.exit_code, 0) << dry.err;
   EXPECT_THAT(dry.out, HasSubstr("would measure horizons of"));

@@ -75,6 +75,7 @@ Status find_idle_genes(const Config& config, unsigned workers, CliContext& conte
                        Summary* summary) {
   constexpr double kLongest_s = 60;
   const auto evaluations = static_cast<double>(config.problem.genes.size() + 1);
+  if (config.problem.genes.empty()) return {};
   if (summary->evaluated.outcome() == v1::WORKER_FAILED) return {};
   const double all_s = evaluations * summary->evaluation_s / std::max(1u, workers);
   if (all_s > kLongest_s) {
@@ -191,25 +192,26 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
                      {"upper", gene.upper},
                      {"log_scale", gene.scale == ParameterScale::kLog}});
   }
-  return {{"config", config.path},
-          {"scenario", config.problem.scenario},
-          {"fitness", fitness_name(config.problem.fitness.kind)},
-          {"problem", problem_hash(to_proto(config.problem))},
-          {"trials", summary.trials},
-          {"sessions", summary.sessions},
-          {"commands", summary.commands},
-          {"conditions", summary.conditions},
-          {"evaluation_s", summary.evaluation_s},
-          {"evaluated", evaluated},
-          {"most_evaluations", most_evaluations(config.evolution, config.problem.genes.size())},
-          {"effects", summary.effects},
-          {"genes", genes},
-          {"population", config.evolution.population},
-          {"generations", config.evolution.generations},
-          {"workers", workers},
-          {"seed", config.seed},
-          {"sanity", sanity_json(summary.sanity)},
-          {"idle_genes", idle}};
+  return {
+      {"config", config.path},
+      {"scenario", config.problem.scenario},
+      {"fitness", fitness_name(config.problem.fitness.kind)},
+      {"problem", problem_hash(to_proto(config.problem))},
+      {"trials", summary.trials},
+      {"sessions", summary.sessions},
+      {"commands", summary.commands},
+      {"conditions", summary.conditions},
+      {"evaluation_s", summary.evaluation_s},
+      {"evaluated", evaluated},
+      {"most_evaluations", genes.empty() ? 0 : most_evaluations(config.evolution, genes.size())},
+      {"effects", summary.effects},
+      {"genes", genes},
+      {"population", config.evolution.population},
+      {"generations", config.evolution.generations},
+      {"workers", workers},
+      {"seed", config.seed},
+      {"sanity", sanity_json(summary.sanity)},
+      {"idle_genes", idle}};
 }
 
 std::string directions_text(const FitnessSettings& fitness) {
@@ -267,6 +269,7 @@ std::string robot_name(const Problem& problem) {
 // What is searched, how, and what that costs.
 std::string search_text(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
+  if (problem.genes.empty()) return "\ngenes        none: nothing can be evolved\n";
   std::string text = "\ngenes        " + std::to_string(problem.genes.size()) + "\n";
   for (const Gene& gene : problem.genes) {
     const Parameter& row = problem.table()[gene.row];
@@ -341,8 +344,11 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
 
 Result<int> run_check(const CheckOptions& options, CliContext& context) {
   Console& console = context.console;
-  ASSIGN_OR_RETURN(const auto config,
-                   open_config(options.config, options.trials, console, check_runnable));
+  // A ground robot's needs no genes to be diagnosed and exported.
+  const auto check = [](const Config& read) {
+    return read.problem.ground && read.problem.genes.empty() ? Status() : check_runnable(read);
+  };
+  ASSIGN_OR_RETURN(const auto config, open_config(options.config, options.trials, console, check));
   const unsigned workers = local_workers({}, config.farm);
   Summary summary = summarise(config);
   // Times that are no seconds would take as long to simulate.

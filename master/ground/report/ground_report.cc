@@ -356,6 +356,7 @@ Diagnosis GroundReport::write() {
   screening();
   trials();
   name_headline();
+  d_.action = what_to_do(search_, d_);
   return std::move(d_);
 }
 

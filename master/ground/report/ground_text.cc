@@ -344,4 +344,17 @@ std::string values_that_would_move(const GroundSearch& search) {
   return joined(moved, ", ", [](const auto& value) { return value.second; });
 }
 
+std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
+  if (!search.faults.empty()) return search.catalogue[search.faults[0].hypothesis].remedy;
+  if (diagnosis.effects.empty()) {
+    return diagnosis.verdict == Verdict::kNone
+               ? "Keep what you have; only more runs, or other drives, could show more."
+               : "Look first at the windows that miss most, below.";
+  }
+  if (search.reference) return "Put right what changed, or fit the robot anew from then on.";
+  if (search.windows.simulated) return "Give these values to the program.";
+  return "Take robot.toml beside this, which has these values, or gapfarm export ros for your "
+         "controller.";
+}
+
 }  // namespace gapfarm

@@ -82,4 +82,7 @@ std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& sea
 // none.  "separation by -3.1 %, lag by +0.05 s".
 std::string values_that_would_move(const GroundSearch& search);
 
+// The one thing to do about it, by the verdict and the effects of `diagnosis`; a sentence.
+std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis);
+
 }  // namespace gapfarm

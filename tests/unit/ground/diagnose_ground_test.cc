@@ -35,6 +35,7 @@ TEST(DiagnoseGround, NamesNothingWhereTheFileIsRight) {
   const GroundDiagnosis found = diagnosis_of(robot, driven(robot, {}));
   EXPECT_TRUE(found.diagnosis.effects.empty()) << found.diagnosis.headline;
   EXPECT_EQ(found.diagnosis.verdict, Verdict::kNone);
+  EXPECT_TRUE(found.diagnosis.action.starts_with("Keep")) << found.diagnosis.action;
   for (const std::string& caution : found.diagnosis.cautions) {
     EXPECT_EQ(caution.find("clocks"), std::string::npos) << caution;
   }
@@ -184,6 +185,7 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
     const GroundDiagnosis found = diagnosis_of(robot, log);
     ASSERT_EQ(found.diagnosis.effects.size(), 1u) << name << ": " << found.diagnosis.headline;
     EXPECT_EQ(found.diagnosis.effects.front().name, name);
+    EXPECT_EQ(found.diagnosis.action, findings.front().remedy);
   }
 }
 
