@@ -1,3 +1,4 @@
+cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" FOLDERS "${FOLDERS}")
 set(sources)
 foreach(folder IN LISTS FOLDERS)
