@@ -42,7 +42,7 @@ Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog
 
 std::optional<GroundFault> best_fault(
     const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
-    const WindowSettings& settings, double before, double least_shrinks, bool anywhere,
+    const WindowSettings& settings, double before, bool anywhere,
     const std::function<double(const WindowFitter&, const RunLog&)>& objective_of) {
   std::optional<GroundFault> best;
   for (std::size_t i = 0; i < question.catalogue.size(); ++i) {
@@ -59,7 +59,7 @@ std::optional<GroundFault> best_fault(
         objective_of(fitter, fault.log) + stretches * std::log(h.metres * h.metres * h.radians);
     fault.gain = fault.objective - before;
     fault.shrinks = std::exp(fault.gain / (3 * stretches));
-    if (fault.gain < kFaultGain || fault.shrinks < least_shrinks) continue;
+    if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;
     if (!best || fault.gain > best->gain) best = std::move(fault);
   }
   return best;
@@ -75,8 +75,7 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
   const auto as_logged = question.windows(robot, log, settings);
   if (!as_logged) return std::nullopt;
   const double before = objective_of(WindowFitter(robot, *as_logged, question.reference), log);
-  return best_fault(robot, log, question, settings, before, kFaultShrinks, /*anywhere=*/false,
-                    objective_of);
+  return best_fault(robot, log, question, settings, before, /*anywhere=*/false, objective_of);
 }
 
 namespace {

@@ -188,7 +188,7 @@ std::optional<GroundFault> fault_of_increments(const GroundRobot& robot, const R
                                                const WindowSettings& settings,
                                                const GroundQuestion& question,
                                                const WindowFit& fit) {
-  return best_fault(robot, log, question, settings, fit.objective, kFaultShrinks, /*anywhere=*/true,
+  return best_fault(robot, log, question, settings, fit.objective, /*anywhere=*/true,
                     [&](const WindowFitter& fitter, const RunLog& right) {
                       return open_fit(fitter, robot, question.rows, right, kFaultRounds).objective;
                     });

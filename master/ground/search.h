@@ -117,12 +117,12 @@ struct GroundFault : FoundFault {
   double objective = 0;  // in nats of the log as it was
 };
 
-// The fault of the log that, put right, explains it best; nothing where none gains `before` and
-// residuals that shrink so much.  `objective_of`: the nats of a log that was put right.
+// The fault of the log that, put right, explains it best; nothing where none gains on `before`, or
+// residuals shrink too little.  `objective_of`: the nats of a log that was put right.
 // `anywhere`: without those that act along an axis of the world.
 std::optional<GroundFault> best_fault(
     const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
-    const WindowSettings& settings, double before, double least_shrinks, bool anywhere,
+    const WindowSettings& settings, double before, bool anywhere,
     const std::function<double(const WindowFitter&, const RunLog&)>& objective_of);
 
 // The same by the file's values, far better than with the log as it is.  In no time: no row moves.

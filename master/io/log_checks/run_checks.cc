@@ -32,11 +32,11 @@ constexpr double kMostLost = 0.1;       // of a run, before the tracker found th
 
 std::string name_of(const LoggedRun& run) { return "run " + run.run; }
 
-bool is_commanded(const LoggedRun& run) {
-  return std::ranges::any_of(run.commands, [](const CommandRow& row) {
-    return std::ranges::any_of(row.values, [](double v) { return v != 0; });
-  });
+bool is_drive(const CommandRow& row) {
+  return std::ranges::any_of(row.values, [](double v) { return v != 0; });
 }
+
+bool is_commanded(const LoggedRun& run) { return std::ranges::any_of(run.commands, is_drive); }
 
 bool never_moves(const LoggedRun& run) {
   return run.poses.size() > 1 && std::ranges::all_of(run.poses, [&](const PoseRow& row) {
@@ -256,7 +256,7 @@ void add_stale_commands(const RunLog& log, double timeout_s, RunChecks* checks) 
   for (const LoggedRun& run : log.runs) {
     for (std::size_t i = 1; i < run.commands.size(); ++i) {
       const CommandRow& row = run.commands[i - 1];
-      if (std::ranges::all_of(row.values, [](double v) { return v == 0; })) continue;
+      if (!is_drive(row)) continue;
       const double held_s = run.commands[i].t_s - row.t_s;
       all_s += held_s;
       stale_s += std::max(0.0, held_s - timeout_s);
