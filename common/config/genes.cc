@@ -162,7 +162,7 @@ class GeneReader {
                             "] with its parameters");
       return;
     }
-    std::vector<std::string> known = mapped(effect.parameters, &EffectParameter::key);
+    std::vector<std::string> known = mapped(effect.parameters, &Parameter::key);
     for (const auto& [key, value] : *section) {
       const std::string word(key.str());
       const auto row = table_.find(effect.name + "." + word);

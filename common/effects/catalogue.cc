@@ -8,35 +8,36 @@ namespace gapfarm {
 namespace {
 
 // What rows are written with.
-EffectParameter real(const char* key, const char* unit, double neutral, double lower, double upper,
-                     const char* summary) {
-  return {key, unit, neutral, lower, upper, summary, {}};
+Parameter real(const char* key, const char* unit, double neutral, double lower, double upper,
+               const char* summary) {
+  return {key, unit, ParameterKind::kReal, ParameterScale::kLinear, lower, upper, neutral, summary};
 }
 
 // Any direction of the plane, or `most` to either side.
-EffectParameter direction(const char* summary, double most = std::numbers::pi) {
+Parameter direction(const char* summary, double most = std::numbers::pi) {
   return real("direction", "rad", 0, -most, most, summary);
 }
 
-EffectParameter choice(const char* key, std::vector<std::string> choices, const char* summary) {
+Parameter choice(const char* key, std::vector<std::string> choices, const char* summary) {
   const auto last = static_cast<double>(choices.size() - 1);
-  return {key, "-", 0, 0, last, summary, std::move(choices)};
+  return {key, "-",     ParameterKind::kChoice, ParameterScale::kLinear, 0, last,
+          0,   summary, std::move(choices)};
 }
 
 Effect effect(EffectStage stage, const char* name, unsigned context, const char* summary,
-              std::vector<EffectParameter> parameters, std::size_t strengths) {
+              std::vector<Parameter> parameters, std::size_t strengths) {
   return {name, stage, context, summary, std::move(parameters), strengths};
 }
 Effect drive(const char* name, unsigned context, const char* summary,
-             std::vector<EffectParameter> parameters, std::size_t strengths = 1) {
+             std::vector<Parameter> parameters, std::size_t strengths = 1) {
   return effect(EffectStage::kDrive, name, context, summary, std::move(parameters), strengths);
 }
 Effect floor(const char* name, unsigned context, const char* summary,
-             std::vector<EffectParameter> parameters, std::size_t strengths = 1) {
+             std::vector<Parameter> parameters, std::size_t strengths = 1) {
   return effect(EffectStage::kFloor, name, context, summary, std::move(parameters), strengths);
 }
 Effect camera(const char* name, unsigned context, const char* summary,
-              std::vector<EffectParameter> parameters, std::size_t strengths = 1) {
+              std::vector<Parameter> parameters, std::size_t strengths = 1) {
   return effect(EffectStage::kCamera, name, context, summary, std::move(parameters), strengths);
 }
 

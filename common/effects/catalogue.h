@@ -26,14 +26,21 @@ enum EffectContext : unsigned {
 // an outlier trial.
 enum class EffectShows { kMean, kSpread, kChance };
 
-struct EffectParameter {
-  std::string key;   // within the effect
-  std::string unit;  // "-" when it has none
-  double neutral = 0;
-  double lower = 0;
+enum class ParameterKind { kReal, kInteger, kBoolean, kChoice };
+enum class ParameterScale { kLinear, kLog };
+
+// A row of a scenario's parameter table, or of an effect, within which its key is.
+struct Parameter {
+  std::string key;   // "mass", "battery_sag.rate"
+  std::string unit;  // SI; "-" when it has none
+  ParameterKind kind = ParameterKind::kReal;
+  ParameterScale scale = ParameterScale::kLinear;
+  double lower = 0;  // bounds of what the simulation accepts
   double upper = 0;
+  double nominal = 0;  // for an effect's parameter: the neutral value
   std::string summary;
-  std::vector<std::string> choices;  // not empty: the value is an index into these
+  std::vector<std::string> choices = {};  // kChoice only; the value is an index
+  std::string effect = {};                // name of the effect it belongs to; empty: base
 };
 
 struct Effect {
@@ -41,7 +48,7 @@ struct Effect {
   EffectStage stage = EffectStage::kDrive;
   unsigned context = kNoContext;
   std::string summary;
-  std::vector<EffectParameter> parameters;
+  std::vector<Parameter> parameters;
   // How many of `parameters`, from the first, must be neutral for the effect to do nothing; the
   // others (a direction, a place) mean nothing then.
   std::size_t strengths = 1;

@@ -6,13 +6,10 @@
 
 #include "common/base/ranges.h"
 #include "common/parameters/ground.h"
+#include "common/parameters/rows.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr Srv1 kNoiseRows[] = {Srv1::kDriveNoiseCommon,  Srv1::kDriveNoiseSide,
-                               Srv1::kPoseNoisePosition, Srv1::kPoseNoiseHeading,
-                               Srv1::kDriveNoiseTail,    Srv1::kPoseNoiseTail};
 
 // What each effect needs of the program beyond speeds and duration.  Effects on the robot's own
 // build are the program's business: a parameter of its own.
@@ -29,63 +26,29 @@ constexpr EffectNeed kEffectNeeds[] = {
 constexpr const char* kOfTheBuild[] = {"com_offset"};
 
 std::vector<Parameter> noise_rows() {
-  return mapped(kNoiseRows, [](Srv1 row) { return srv1_table()[row_of(row)]; });
+  const auto& rows = srv1_table().rows();
+  return {rows.begin() + row_of(Srv1::kDriveNoiseCommon),
+          rows.begin() + row_of(Srv1::kPoseNoiseTail) + 1};
 }
 
 constexpr double kReach_m = 0.3;  // of a laboratory's robot: scales the noise that is assumed
 
 // Around a program that follows the commands of runs.
 std::vector<Parameter> run_rows(const std::vector<std::string>& channels) {
-  using enum ParameterKind;
-  using enum ParameterScale;
-  const Parameter rows[] = {
-      {"delay",
-       "s",
-       kReal,
-       kLinear,
-       -1,
-       1,
-       0,
-       "from a command to when the program gets it",
-       {},
-       ""},
-      {"marker.x", "m", kReal, kLinear, -1, 1, 0, "the tracked point, ahead", {}, ""},
-      {"marker.y", "m", kReal, kLinear, -1, 1, 0, "the tracked point, to the left", {}, ""},
-      {"marker.yaw",
-       "rad",
-       kReal,
-       kLinear,
-       -M_PI,
-       M_PI,
-       0,
-       "heading of the tracked point",
-       {},
-       ""}};
-  std::vector<Parameter> all(std::begin(rows), std::end(rows));
+  using rows::real;
+  std::vector<Parameter> all = {
+      real("delay", "s", -1, 1, 0, "from a command to when the program gets it"),
+      real("marker.x", "m", -1, 1, 0, "the tracked point, ahead"),
+      real("marker.y", "m", -1, 1, 0, "the tracked point, to the left"),
+      real("marker.yaw", "rad", -M_PI, M_PI, 0, "heading of the tracked point")};
   for (const Parameter& noise : window_noise_rows(kReach_m)) all.push_back(noise);
   for (const std::string& channel : channels) {
-    all.push_back({channel + kChannelGain,
-                   "-",
-                   kReal,
-                   kLinear,
-                   0.1,
-                   10,
-                   1,
-                   "what " + channel + " is multiplied by before the program gets it",
-                   {},
-                   ""});
+    all.push_back(real(channel + kChannelGain, "-", 0.1, 10, 1,
+                       "what " + channel + " is multiplied by before the program gets it"));
   }
   for (const std::string& channel : channels) {
-    all.push_back({channel + kChannelOffset,
-                   "-",
-                   kReal,
-                   kLinear,
-                   -100,
-                   100,
-                   0,
-                   "what is added to " + channel + " then",
-                   {},
-                   ""});
+    all.push_back(
+        real(channel + kChannelOffset, "-", -100, 100, 0, "what is added to " + channel + " then"));
   }
   return all;
 }

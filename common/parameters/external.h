@@ -71,14 +71,9 @@ class ExternalTable {
 
   const ExternalDeclaration& declaration() const { return declaration_; }
   const ParameterTable& table() const { return *table_; }
-  // The first rows are the declaration's, in its order; these follow, but of an objective and of a
-  // program with channels.
-  std::size_t drive_noise_common() const { return declaration_.parameters.size(); }
-  std::size_t drive_noise_side() const { return drive_noise_common() + 1; }
-  std::size_t pose_noise_position() const { return drive_noise_common() + 2; }
-  std::size_t pose_noise_heading() const { return drive_noise_common() + 3; }
-  std::size_t drive_noise_tail() const { return drive_noise_common() + 4; }
-  std::size_t pose_noise_tail() const { return drive_noise_common() + 5; }
+  // The first rows are the declaration's, in its order; but of an objective and of a program with
+  // channels the noise of scenario `srv1` follows, in that table's order.
+  std::size_t first_noise_row() const { return declaration_.parameters.size(); }
 
  private:
   ExternalDeclaration declaration_;

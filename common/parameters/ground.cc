@@ -7,6 +7,7 @@
 
 #include "common/base/constants.h"
 #include "common/base/ranges.h"
+#include "common/parameters/rows.h"
 
 namespace gapfarm {
 namespace {
@@ -36,16 +37,8 @@ class Rows {
   void add(const std::string& key, const char* unit, double lower, double upper, double nominal,
            const std::string& summary, Put put, ParameterScale scale = kLinear,
            ParameterKind kind = kReal) {
-    rows.push_back({key,
-                    unit,
-                    kind,
-                    scale,
-                    std::min(lower, nominal),
-                    std::max(upper, nominal),
-                    nominal,
-                    summary,
-                    {},
-                    ""});
+    rows.push_back({key, unit, kind, scale, std::min(lower, nominal), std::max(upper, nominal),
+                    nominal, summary});
     puts.push_back(std::move(put));
   }
   // A size: from half the robot's own to twice.
@@ -319,17 +312,15 @@ GroundRobot GroundTable::robot_at(const ParameterValues& values) const {
 }
 
 std::vector<Parameter> window_noise_rows(double far_m) {
-  const auto row = [](const char* key, const char* unit, double upper, double nominal,
-                      const char* summary) {
-    return Parameter{key, unit, kReal, kLog, 1e-5, upper, nominal, summary, {}, ""};
-  };
-  return {row(kGroundTravelNoise, "m/sqrt(m)", far_m, 0.05 * far_m,
-              "standard deviation of the way after a metre of it; grows with its root"),
-          row(kGroundTurnNoise, "rad/sqrt(m)", 1, 0.05,
-              "standard deviation of the heading after a metre of the wheels' way"),
-          row(kGroundPositionNoise, "m", far_m, 0.02 * far_m,
-              "standard deviation of a measured x and y"),
-          row(kGroundHeadingNoise, "rad", 0.5, 0.01, "standard deviation of a measured heading")};
+  using rows::real;
+  return {real(kGroundTravelNoise, "m/sqrt(m)", 1e-5, far_m, 0.05 * far_m,
+               "standard deviation of the way after a metre of it; grows with its root", kLog),
+          real(kGroundTurnNoise, "rad/sqrt(m)", 1e-5, 1, 0.05,
+               "standard deviation of the heading after a metre of the wheels' way", kLog),
+          real(kGroundPositionNoise, "m", 1e-5, far_m, 0.02 * far_m,
+               "standard deviation of a measured x and y", kLog),
+          real(kGroundHeadingNoise, "rad", 1e-5, 0.5, 0.01,
+               "standard deviation of a measured heading", kLog)};
 }
 
 const ParameterTable& ground_table() {

@@ -44,26 +44,17 @@ constexpr ScenarioTable kScenarioTables[] = {{"srv1", srv1_table},
                                              {"external_runs", external_runs_table},
                                              {"objective", external_table}};
 
-Parameter effect_parameter(const Effect& effect, const EffectParameter& p) {
-  return {effect.name + "." + p.key,
-          p.unit,
-          p.choices.empty() ? kReal : kChoice,
-          kLinear,
-          p.lower,
-          p.upper,
-          p.neutral,
-          p.summary,
-          p.choices,
-          effect.name};
-}
-
 }  // namespace
 
 ParameterTable::ParameterTable(std::vector<Parameter> base, std::span<const Effect> effects)
     : rows_(std::move(base)), effects_(effects) {
   for (const Effect& effect : effects) {
     effect_rows_.push_back(rows_.size());
-    for (const EffectParameter& p : effect.parameters) rows_.push_back(effect_parameter(effect, p));
+    for (const Parameter& p : effect.parameters) {
+      rows_.push_back(p);
+      rows_.back().key = effect.name + "." + p.key;
+      rows_.back().effect = effect.name;
+    }
   }
 }
 
@@ -90,14 +81,14 @@ void ParameterTable::without_chance(ParameterValues* values) const {
   for (std::size_t e = 0; e < effects_.size(); ++e) {
     if (effects_[e].shows != EffectShows::kChance) continue;
     for (std::size_t i = 0; i < effects_[e].strengths; ++i) {
-      (*values)[effect_rows_[e] + i] = effects_[e].parameters[i].neutral;
+      (*values)[effect_rows_[e] + i] = effects_[e].parameters[i].nominal;
     }
   }
 }
 
 bool ParameterTable::is_neutral(std::size_t e, const ParameterValues& values) const {
   for (std::size_t i = 0; i < effects_[e].strengths; ++i) {
-    if (values[effect_rows_[e] + i] != effects_[e].parameters[i].neutral) return false;
+    if (values[effect_rows_[e] + i] != effects_[e].parameters[i].nominal) return false;
   }
   return true;
 }

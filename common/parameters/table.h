@@ -14,22 +14,6 @@
 
 namespace gapfarm {
 
-enum class ParameterKind { kReal, kInteger, kBoolean, kChoice };
-enum class ParameterScale { kLinear, kLog };
-
-struct Parameter {
-  std::string key;   // "mass", "battery_sag.rate"
-  std::string unit;  // SI; "-" when it has none
-  ParameterKind kind = ParameterKind::kReal;
-  ParameterScale scale = ParameterScale::kLinear;
-  double lower = 0;  // bounds of what the simulation accepts
-  double upper = 0;
-  double nominal = 0;  // for an effect's parameter: the neutral value
-  std::string summary;
-  std::vector<std::string> choices;  // kChoice only; the value is an index
-  std::string effect;                // name of the effect it belongs to; empty: base
-};
-
 // One value a row.  Booleans are 0 or 1, choices are indices, integers are whole.
 using ParameterValues = std::vector<double>;
 

@@ -102,7 +102,7 @@ std::vector<Effect> tracked_effects(double scale) {
   std::vector<Effect> effects(catalogue.begin(), catalogue.end());
   for (Effect& effect : effects) {
     const double factor = effect.of_the_robot ? scale : std::max(1.0, scale);
-    for (EffectParameter& p : effect.parameters) {
+    for (Parameter& p : effect.parameters) {
       if (p.unit != "m") continue;
       p.lower = three_digits(p.lower * factor);
       p.upper = three_digits(p.upper * factor);

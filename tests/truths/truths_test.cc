@@ -31,7 +31,7 @@ TEST(Truths, EveryEffectOfTheCatalogueIsThereWithItsParameters) {
     EXPECT_TRUE(row.in_catalogue);
     const Values values = row.draw(0.5, 2, Stream({1}));
     EXPECT_EQ(values.size(), effect.parameters.size()) << effect.name;
-    for (const EffectParameter& p : effect.parameters) {
+    for (const Parameter& p : effect.parameters) {
       ASSERT_TRUE(values.contains(p.key)) << effect.name << " " << p.key;
       EXPECT_GE(values.at(p.key), p.lower) << effect.name << " " << p.key;
       const double upper = p.choices.empty() ? p.upper : 1;

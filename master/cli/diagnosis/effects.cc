@@ -42,19 +42,19 @@ const char* stage_name(EffectStage stage) {
   return kNames[static_cast<std::size_t>(stage)];
 }
 
-std::string value_text(const EffectParameter& p, double value) {
+std::string value_text(const Parameter& p, double value) {
   if (!p.choices.empty()) return p.choices[static_cast<std::size_t>(value)];
   return fmt::format("{:.4g}", value);
 }
 
-std::string range_text(const EffectParameter& p, bool strength) {
+std::string range_text(const Parameter& p, bool strength) {
   std::string text;
   if (p.choices.empty()) {
     text = fmt::format("{:.4g} to {:.4g}", p.lower, p.upper);
   } else {
     for (const std::string& choice : p.choices) text += (text.empty() ? "" : " or ") + choice;
   }
-  return text + (strength ? ", neutral " : ", default ") + value_text(p, p.neutral);
+  return text + (strength ? ", neutral " : ", default ") + value_text(p, p.nominal);
 }
 
 std::string listing(std::span<const Effect> effects) {
@@ -62,7 +62,7 @@ std::string listing(std::span<const Effect> effects) {
   for (const Effect& effect : effects) {
     text += fmt::format("{} ({}): {}\n", effect.name, stage_name(effect.stage), effect.summary);
     for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-      const EffectParameter& p = effect.parameters[i];
+      const Parameter& p = effect.parameters[i];
       text += fmt::format("    {:<12} {:<6} {}; {}\n", p.key, p.unit, p.summary,
                           range_text(p, i < effect.strengths));
     }
@@ -75,10 +75,10 @@ Json to_json(std::span<const Effect> effects) {
   for (const Effect& effect : effects) {
     Json parameters = Json::array();
     for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-      const EffectParameter& p = effect.parameters[i];
+      const Parameter& p = effect.parameters[i];
       Json entry = {
           {"key", p.key},         {"unit", p.unit},
-          {"summary", p.summary}, {i < effect.strengths ? "neutral" : "default", p.neutral},
+          {"summary", p.summary}, {i < effect.strengths ? "neutral" : "default", p.nominal},
           {"lower", p.lower},     {"upper", p.upper}};
       if (!p.choices.empty()) entry["choices"] = p.choices;
       parameters.push_back(std::move(entry));
@@ -94,9 +94,9 @@ Json to_json(std::span<const Effect> effects) {
 std::vector<double> figure_values(const Effect& effect) {
   std::vector<double> values;
   for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-    const EffectParameter& p = effect.parameters[i];
+    const Parameter& p = effect.parameters[i];
     const double share = i < effect.strengths ? kFigureStrength : 0;
-    values.push_back(p.neutral + share * (p.upper - p.neutral));
+    values.push_back(p.nominal + share * (p.upper - p.nominal));
   }
   return values;
 }
@@ -207,7 +207,7 @@ std::vector<v1::Task> figure_tasks(const Problem& problem) {
     std::vector<v1::Override> off, on;
     const std::vector<double> values = figure_values(effect);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      off.push_back(override_of(table.effect_row(e) + i, effect.parameters[i].neutral));
+      off.push_back(override_of(table.effect_row(e) + i, effect.parameters[i].nominal));
       on.push_back(override_of(table.effect_row(e) + i, values[i]));
     }
     tasks.push_back(figure_task(problem, effect, off));

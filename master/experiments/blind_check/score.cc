@@ -98,7 +98,7 @@ Judgement judge_effects(const Truth& truth, const Reported& reported) {
 bool does_nothing(const Effect& entry, const TrueEffect& effect) {
   for (std::size_t i = 0; i < entry.strengths; ++i) {
     const auto found = effect.parameters.find(entry.parameters[i].key);
-    if (found != effect.parameters.end() && found->second != entry.parameters[i].neutral) {
+    if (found != effect.parameters.end() && found->second != entry.parameters[i].nominal) {
       return false;
     }
   }
@@ -172,11 +172,11 @@ std::optional<bool> missed_below(const Truth& truth, const Reported& reported) {
     const Effect* entry = catalogue_entry(effect.name);
     if (named || !entry || truth.kind == CaseKind::kOutside) continue;
     for (std::size_t i = 0; i < entry->strengths; ++i) {
-      const EffectParameter& p = entry->parameters[i];
+      const Parameter& p = entry->parameters[i];
       const auto value = effect.parameters.find(p.key);
       const auto from = reported.detectable_from.find(effect.name + "." + p.key);
       if (value == effect.parameters.end() || from == reported.detectable_from.end()) continue;
-      below = below.value_or(true) && std::abs(value->second - p.neutral) < from->second;
+      below = below.value_or(true) && std::abs(value->second - p.nominal) < from->second;
     }
   }
   return below;
@@ -217,7 +217,7 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) 
     const bool neutral = does_nothing(*entry, effect);
     const std::map<std::string, double> stated = as_reported(effect);
     for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
-      const EffectParameter& p = entry->parameters[i];
+      const Parameter& p = entry->parameters[i];
       const auto value = stated.find(p.key);
       if (value == stated.end() || !p.choices.empty()) continue;
       if (neutral && i >= entry->strengths) continue;

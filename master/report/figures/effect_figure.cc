@@ -160,7 +160,7 @@ std::string difference(const EffectDrives& drives) {
 std::string values_text(const Effect& effect, std::span<const double> values) {
   std::string text;
   for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-    const EffectParameter& p = effect.parameters[i];
+    const Parameter& p = effect.parameters[i];
     text += text.empty() ? "" : ", ";
     text += p.key + " = ";
     text += p.choices.empty() ? fmt::format("{:.4g}", values[i])

@@ -108,7 +108,7 @@ TEST(PushPhrases, ReportOfEveryEffectOfTheCatalogue) {
   for (const Effect& effect : push_effects()) {
     NamedEffect named;
     named.name = effect.name;
-    for (const EffectParameter& p : effect.parameters) {
+    for (const Parameter& p : effect.parameters) {
       named.parameters.push_back({p.key, 0.1, 0.05, 0.2, p.unit});
     }
     const std::string text = effect_sentence(named, push_effect_diagnoses());

@@ -245,7 +245,7 @@ TEST(Findings, ReportEffectsInPlainUnits) {
   for (const Effect& effect : srv1_effects()) {
     NamedEffect e;
     e.name = effect.name;
-    for (const EffectParameter& p : effect.parameters) {
+    for (const Parameter& p : effect.parameters) {
       e.parameters.push_back({p.key, 0.1, 0.05, 0.2, p.unit});
     }
     const std::string text = effect_sentence(e);
@@ -282,7 +282,7 @@ TEST(Findings, EveryEffectOfACatalogueHasARow) {
     EXPECT_EQ(shown, effect.moves_means() && searched.count(effect.name) == 0) << effect.name;
     for (const ProbedStep& step : row->steps) {
       EXPECT_TRUE(std::any_of(effect.parameters.begin(), effect.parameters.end(),
-                              [&](const EffectParameter& p) { return p.key == step.key; }))
+                              [&](const Parameter& p) { return p.key == step.key; }))
           << effect.name << "." << step.key;
     }
     for (const char* alias : row->aliases) {
@@ -320,7 +320,7 @@ TEST(Findings, AHeadlineIsALineAndAnAction) {
   for (const Effect& effect : srv1_effects()) {
     NamedEffect e;
     e.name = effect.name;
-    for (const EffectParameter& p : effect.parameters) {
+    for (const Parameter& p : effect.parameters) {
       if (p.choices.empty()) e.parameters.push_back({p.key, -0.1, -0.2, -0.05, p.unit});
       if (!p.choices.empty()) e.axis = p.choices[1];
     }

@@ -99,8 +99,8 @@ TEST(ExternalTable, HasTheProgramsRowsThenNoiseThenEffectsThatCanBeApplied) {
   const ExternalTable plain(parse_declaration(declaration_with(kMass)).value());
   EXPECT_EQ(plain.table()[0].key, "mass");
   EXPECT_EQ(plain.table()[0].scale, ParameterScale::kLog);
-  EXPECT_EQ(plain.table()[plain.drive_noise_common()].key, "drive_noise_common");
-  EXPECT_EQ(plain.table()[plain.pose_noise_tail()].key, "pose_noise_tail");
+  EXPECT_EQ(plain.table()[plain.first_noise_row()].key, "drive_noise_common");
+  EXPECT_EQ(plain.table()[plain.first_noise_row() + 5].key, "pose_noise_tail");
   EXPECT_TRUE(plain.table().find("motor_asymmetry.ratio") ||
               plain.table().find("camera_aspect.ratio"));
   for (const char* needs : {"motor_lag.tau", "floor_tilt.angle", "backlash.travel"}) {

@@ -34,10 +34,10 @@ ParameterValues with_effect(const ParameterTable& table, std::size_t e) {
   ParameterValues values = noiseless();
   const Effect& effect = table.effects()[e];
   for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-    const EffectParameter& p = effect.parameters[i];
+    const Parameter& p = effect.parameters[i];
     const double place = p.choices.empty() && i >= effect.strengths ? 0.5 : 0;
     values[table.effect_row(e) + i] =
-        i < effect.strengths ? p.neutral + 0.1 * (p.upper - p.neutral) : place;
+        i < effect.strengths ? p.nominal + 0.1 * (p.upper - p.nominal) : place;
   }
   return values;
 }

@@ -28,12 +28,12 @@ std::string section_of(const std::string& page, const std::string& name) {
 
 // "| rate | 1/min | 0 | -0.05 to 0.05 |"
 std::string row_of(const Effect& effect, std::size_t i) {
-  const EffectParameter& p = effect.parameters[i];
+  const Parameter& p = effect.parameters[i];
   std::ostringstream row;
   row.precision(4);
   row << "| " << p.key << " | " << p.unit << " | ";
   if (i < effect.strengths) {
-    row << p.neutral << " | ";
+    row << p.nominal << " | ";
   } else {
     row << "- | ";
   }

@@ -67,7 +67,7 @@ ParameterValues neutral(const Problem& problem, std::size_t e, double place) {
   ParameterValues values = problem.values;
   const Effect& effect = table.effects()[e];
   for (std::size_t i = effect.strengths; i < effect.parameters.size(); ++i) {
-    const EffectParameter& p = effect.parameters[i];
+    const Parameter& p = effect.parameters[i];
     const double value = p.lower + place * (p.upper - p.lower);
     values[table.effect_row(e) + i] = p.choices.empty() ? value : std::round(value);
   }
@@ -116,12 +116,12 @@ TEST(NeutralEffects, HaveNoStepNextToThem) {
     const Effect& effect = table.effects()[e];
     v1::Task task = predict();
     for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-      const EffectParameter& p = effect.parameters[i];
+      const Parameter& p = effect.parameters[i];
       v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
       to->set_parameter(static_cast<std::uint32_t>(table.effect_row(e) + i));
       // Places in the midst of the trials, patches all over them.
       const double place = p.key == "radius" || p.key == "position" ? p.upper / 2 : 0.9;
-      to->set_value(i < effect.strengths ? p.neutral + 1e-7 : p.choices.empty() ? place : 0);
+      to->set_value(i < effect.strengths ? p.nominal + 1e-7 : p.choices.empty() ? place : 0);
     }
     const v1::TaskResult result = evaluate(prepared->get(), task);
     ASSERT_EQ(result.outcome(), v1::OK) << effect.name << ": " << result.message();

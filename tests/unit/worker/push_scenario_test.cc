@@ -43,9 +43,9 @@ TEST(PushEffects, EveryEffectMovesSomeEnd) {
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     const Effect& effect = table.effects()[e];
     Problem problem = push_problem();
-    const EffectParameter& strength = effect.parameters.front();
+    const Parameter& strength = effect.parameters.front();
     problem.values[table.effect_row(e)] =
-        strength.neutral + 0.3 * (strength.upper - strength.neutral);
+        strength.nominal + 0.3 * (strength.upper - strength.nominal);
     if (effect.name == "friction_patch") {
       push_value(problem, "friction_patch.x") = 0.35;
       push_value(problem, "friction_patch.y") = 0.2;

@@ -26,17 +26,10 @@ SideDrive side_drive(const SideState& side, double full_speed_m_s, double noise_
 }
 
 NoiseSettings noise_of(const Problem& problem, const ParameterValues& values) {
-  if (problem.external) {
-    const ExternalTable& e = problem.external->table;
-    return {values[e.drive_noise_common()],
-            values[e.drive_noise_side()],
-            {values[e.pose_noise_position()], values[e.pose_noise_heading()]},
-            {values[e.drive_noise_tail()], values[e.pose_noise_tail()]}};
-  }
-  return {at(values, Srv1::kDriveNoiseCommon),
-          at(values, Srv1::kDriveNoiseSide),
-          {at(values, Srv1::kPoseNoisePosition), at(values, Srv1::kPoseNoiseHeading)},
-          {at(values, Srv1::kDriveNoiseTail), at(values, Srv1::kPoseNoiseTail)}};
+  const double* noise =
+      values.data() + (problem.external ? problem.external->table.first_noise_row()
+                                        : row_of(Srv1::kDriveNoiseCommon));
+  return {noise[0], noise[1], {noise[2], noise[3]}, {noise[4], noise[5]}};
 }
 
 class BulletVehicle final : public Vehicle {

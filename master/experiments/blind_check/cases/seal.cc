@@ -34,7 +34,7 @@ std::optional<double> parameter_value(const std::string& effect, const std::stri
   if (!value.is_string()) return std::nullopt;
   const Effect* entry = catalogue_entry(effect);
   if (entry == nullptr) return std::nullopt;
-  for (const EffectParameter& p : entry->parameters) {
+  for (const Parameter& p : entry->parameters) {
     const auto word = std::find(p.choices.begin(), p.choices.end(), value.get<std::string>());
     if (p.key == key && word != p.choices.end()) {
       return static_cast<double>(word - p.choices.begin());
