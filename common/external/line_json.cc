@@ -1,5 +1,6 @@
 #include "common/external/line_json.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -9,12 +10,16 @@ namespace gapfarm::line_json {
 
 constexpr std::size_t kShown = 80;
 
+static bool is_control(char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }
+
+std::string shown(const std::string& text) {
+  std::string beginning = text.substr(0, kShown);
+  std::ranges::replace_if(beginning, is_control, '?');
+  return "'" + beginning + (text.size() > kShown ? "...'" : "'");
+}
+
 Error wrong(const std::string& what, const std::string& line) {
-  std::string shown = line.substr(0, kShown);
-  for (char& c : shown) {
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
-  }
-  return Error{what + ": '" + shown + (line.size() > kShown ? "...'" : "'")};
+  return Error{what + ": " + shown(line)};
 }
 
 Result<Json> read_object(const std::string& line, const std::string& what,
@@ -39,9 +44,8 @@ Result<Json> read_object(const std::string& line, const std::string& what,
 std::string word_of(const Json& json, const char* key) {
   const auto found = json.find(key);
   std::string word = found != json.end() && found->is_string() ? found->get<std::string>() : "";
-  for (char& c : word) {  // it goes into one line of models and messages
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = ' ';
-  }
+  // It goes into one line of models and messages.
+  std::ranges::replace_if(word, is_control, ' ');
   return word;
 }
 

@@ -8,7 +8,10 @@
 
 namespace gapfarm::line_json {
 
-// `what`, and the beginning of the line.
+// The beginning of what a program printed, quoted, with control bytes as '?'.
+std::string shown(const std::string& text);
+
+// `what`, and the line as shown().
 Error wrong(const std::string& what, const std::string& line);
 
 // Python's json and others print what JSON does not have.  `not_a_number`: where to put the first

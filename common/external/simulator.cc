@@ -16,25 +16,12 @@
 #include "common/base/shell.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
+#include "common/external/line_json.h"
 #include "common/process/child.h"
 
 namespace gapfarm {
 
 namespace {
-
-constexpr std::size_t kShownBytes = 80;
-
-// The beginning of what was reported, with control bytes as '?'.
-std::string shown_line(std::string text) {
-  const bool cut = text.size() > kShownBytes;
-  text.resize(std::min(text.size(), kShownBytes));
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
-  }
-  return "'" + text + (cut ? "...'" : "'");
-}
-
-std::string in_seconds(double seconds) { return formatted("%g s", seconds); }
 
 void close_fd(int* fd) {
   if (*fd >= 0) close(*fd);
@@ -149,7 +136,7 @@ Result<std::string> LineProgram::receive(double until, double limit_s) {
     const std::size_t end = rest_.find('\n');
     if (std::min(end, rest_.size()) > limits_.answer_bytes) {
       return failed("sent more than the " + std::to_string(limits_.answer_bytes) +
-                    " bytes that a line may have: " + shown_line(rest_));
+                    " bytes that a line may have: " + line_json::shown(rest_));
     }
     if (end != rest_.npos) {
       std::string line = rest_.substr(0, end);
@@ -157,7 +144,7 @@ Result<std::string> LineProgram::receive(double until, double limit_s) {
       return line;
     }
     if (!wait_for(from_, POLLIN, until)) {
-      return failed("did not answer within " + in_seconds(limit_s));
+      return failed("did not answer within " + formatted("%g s", limit_s));
     }
     char bytes[65536];
     const ssize_t n = read(from_, bytes, sizeof bytes);
@@ -174,14 +161,14 @@ Result<std::string> LineProgram::ask(const std::string& line) {
     RETURN_IF_ERROR(start());
   }
   if (rest_.empty() && wait_for(from_, POLLIN, clock_())) {
-    char bytes[kShownBytes];
+    char bytes[80];
     const ssize_t n = read(from_, bytes, sizeof bytes);
     if (n <= 0) return ended();
     rest_.assign(bytes, static_cast<std::size_t>(n));
   }
   if (!rest_.empty()) {
     const char* when = answered_ ? "answered twice, or late: " : "spoke before it was asked: ";
-    return failed(when + shown_line(rest_));
+    return failed(when + line_json::shown(rest_));
   }
   const double limit_s = answered_ ? limits_.answer_s : limits_.start_s;
   const double until = clock_() + limit_s;
