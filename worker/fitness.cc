@@ -9,10 +9,6 @@
 namespace gapfarm {
 namespace {
 
-bool same_command(const CommandSpec& a, const CommandSpec& b) {
-  return a.name == b.name && a.left == b.left && a.right == b.right && a.duration_s == b.duration_s;
-}
-
 // Mean simulated displacement of some trials, each seen from its measured start.
 Pose mean_displacement(const Problem& problem, const Prediction& prediction,
                        const std::vector<std::size_t>& members) {
@@ -110,8 +106,9 @@ Result<FitnessReference> fitness_reference(const Problem& problem) {
     reference.real.push_back({motion.command.name, motion.motion.mean, motion.motion.covariance});
     reference.members.emplace_back();
     for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
-      const CommandSpec c = resolved_command(problem.log.trials[i], problem.commands);
-      if (same_command(c, motion.command)) reference.members.back().push_back(i);
+      if (resolved_command(problem.log.trials[i], problem.commands) == motion.command) {
+        reference.members.back().push_back(i);
+      }
     }
     const auto named = std::ranges::find(problem.commands, motion.command.name, &CommandSpec::name);
     reference.command.push_back(static_cast<std::size_t>(named - problem.commands.begin()));

@@ -2,6 +2,7 @@
 // genome, with a hash that names it.
 #pragma once
 
+#include <compare>
 #include <memory>
 #include <span>
 #include <string>
@@ -30,6 +31,8 @@ struct CommandSpec {
   double left = 0;  // duty, [-1, 1]
   double right = 0;
   double duration_s = 1;
+
+  auto operator<=>(const CommandSpec&) const = default;
 };
 
 enum class FitnessKind {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <tuple>
 
 #include "common/base/text.h"
 #include "common/base/try.h"
@@ -25,10 +24,7 @@ constexpr int kDigits = 12;           // bits of the freedom's logarithm
 constexpr double kLeastScale = 1e-5;  // m and rad: identical trials would have no density
 constexpr double kLeastVariance = 1e-10;
 
-using CommandKey = std::tuple<std::string, double, double, double>;
-using Ends = std::map<CommandKey, std::vector<Eigen::Vector3d>>;
-
-CommandKey command_key(const CommandSpec& c) { return {c.name, c.left, c.right, c.duration_s}; }
+using Ends = std::map<CommandSpec, std::vector<Eigen::Vector3d>>;
 
 // Of Student's t about a place, without its scale: n dimensions at the squared distance.
 double log_t(double squared, double freedom, int n) {
@@ -89,7 +85,7 @@ class ConstantMotion {
  public:
   explicit ConstantMotion(const Ends& ends) {
     for (int k = 0; k < 3; ++k) {
-      std::map<CommandKey, std::vector<double>> values;
+      std::map<CommandSpec, std::vector<double>> values;
       for (const auto& [key, all] : ends) {
         for (const Eigen::Vector3d& end : all) values[key].push_back(end[k]);
       }
@@ -107,7 +103,7 @@ class ConstantMotion {
     }
   }
 
-  double log_density(const CommandKey& key, const Eigen::Vector3d& end) const {
+  double log_density(const CommandSpec& key, const Eigen::Vector3d& end) const {
     const std::array<Student, 3>& own = places_.at(key);
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
@@ -118,7 +114,7 @@ class ConstantMotion {
 
  private:
   Eigen::Vector3d freedom_;
-  std::map<CommandKey, std::array<Student, 3>> places_;
+  std::map<CommandSpec, std::array<Student, 3>> places_;
 };
 
 // About each command's robust mean and covariance.
@@ -127,7 +123,7 @@ class MinedMotion {
   MinedMotion(const MotionModel& model, const Ends& ends) {
     std::vector<double> squares;
     for (const CommandMotion& motion : model.commands()) {
-      const auto own = ends.find(command_key(motion.command));
+      const auto own = ends.find(motion.command);
       if (own == ends.end()) continue;
       Eigen::Matrix3d covariance = motion.motion.covariance;
       covariance.diagonal().array() += kLeastVariance;
@@ -148,7 +144,7 @@ class MinedMotion {
     scale_ = scale_of(squares, freedom_);
   }
 
-  std::optional<double> log_density(const CommandKey& key, const Eigen::Vector3d& end) const {
+  std::optional<double> log_density(const CommandSpec& key, const Eigen::Vector3d& end) const {
     const auto factor = factors_.find(key);
     if (factor == factors_.end()) return std::nullopt;
     return log_t(factor->second.squared_distance(end) / scale_, freedom_, 3) -
@@ -167,7 +163,7 @@ class MinedMotion {
     return scale;
   }
 
-  std::map<CommandKey, Covariance3> factors_;
+  std::map<CommandSpec, Covariance3> factors_;
   double freedom_ = 1;
   double scale_ = 1;
 };
@@ -186,13 +182,12 @@ Result<std::vector<BaselineScores>> baseline_scores(const TrialLog& train, const
   names.least_trials = test.trials.size() + 1;
   ASSIGN_OR_RETURN(const auto check, MotionModel::mine(test, commands, names));
   // Ends about each command's robust mean, in the start's axes.
-  std::map<CommandKey, Pose> about;
+  std::map<CommandSpec, Pose> about;
   for (const CommandMotion& motion : mined.commands()) {
-    if (motion.trials >= kLeastBaselineTrials)
-      about[command_key(motion.command)] = motion.motion.mean;
+    if (motion.trials >= kLeastBaselineTrials) about[motion.command] = motion.motion.mean;
   }
   const auto seen = [&](const Trial& trial) {
-    const CommandKey key = command_key(resolved_command(trial, commands));
+    const CommandSpec key = resolved_command(trial, commands);
     const Pose end = between(trial.X_WS, trial.X_WE);
     const auto mean = about.find(key);
     std::optional<Eigen::Vector3d> offset;

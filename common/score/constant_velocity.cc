@@ -9,10 +9,6 @@
 namespace gapfarm {
 namespace {
 
-bool same(const CommandSpec& a, const CommandSpec& b) {
-  return a.name == b.name && a.left == b.left && a.right == b.right && a.duration_s == b.duration_s;
-}
-
 void fit(const std::vector<Pose>& ends, ConstantVelocity* model) {
   std::vector<double> along, turned;
   for (const Pose& X_SE : ends) {
@@ -51,7 +47,7 @@ Result<std::vector<ConstantVelocity>> constant_velocities(const TrialLog& log,
     }
     std::vector<Pose> ends;
     for (const Trial& trial : log.trials) {
-      if (same(resolved_command(trial, commands), motion.command)) {
+      if (resolved_command(trial, commands) == motion.command) {
         ends.push_back(between(trial.X_WS, trial.X_WE));
       }
     }
@@ -86,8 +82,7 @@ Result<double> constant_velocity_fitness(const Problem& problem) {
   std::vector<ScoredTrial> scored;
   for (const Trial& trial : problem.log.trials) {
     const CommandSpec command = resolved_command(trial, problem.commands);
-    const auto model = std::find_if(models->begin(), models->end(),
-                                    [&](const auto& m) { return same(m.command, command); });
+    const auto model = std::ranges::find(*models, command, &ConstantVelocity::command);
     const Pose X_WP = trial.X_WS * model->at(command.duration_s);
     scored.push_back({local_difference(X_WP, trial.X_WE), model->covariance});
   }

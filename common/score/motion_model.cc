@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <map>
 #include <sstream>
 
 #include "common/base/ranges.h"
@@ -10,12 +11,6 @@
 
 namespace gapfarm {
 namespace {
-
-using Key = std::tuple<std::string, double, double, double>;
-
-Key key_of(const CommandSpec& command) {
-  return {command.name, command.left, command.right, command.duration_s};
-}
 
 std::string describe(const CommandSpec& command) {
   std::ostringstream text;
@@ -50,20 +45,19 @@ Result<MotionModel> MotionModel::mine(const TrialLog& log, std::span<const Comma
   if (log.trials.empty()) {
     return Error{"a motion model needs trials, but the log is empty; pass a trial file"};
   }
-  std::map<Key, std::vector<Pose>> ends;
+  std::map<CommandSpec, std::vector<Pose>> ends;
   for (const Trial& trial : log.trials) {
     if (find_command(commands, trial.command) == nullptr) {
       return Error{"session '" + trial.session + "', trial " + std::to_string(trial.trial) +
                    ": command '" + trial.command + "' is not one of the scenario's"};
     }
-    ends[key_of(resolved_command(trial, commands))].push_back(between(trial.X_WS, trial.X_WE));
+    ends[resolved_command(trial, commands)].push_back(between(trial.X_WS, trial.X_WE));
   }
   MotionModel model;
   model.least_trials_ = std::max<std::size_t>(settings.least_trials, 1);
-  for (const auto& [key, poses] : ends) {
-    const auto& [name, left, right, duration_s] = key;
+  for (const auto& [command, poses] : ends) {
     CommandMotion motion;
-    motion.command = {name, left, right, duration_s};
+    motion.command = command;
     motion.trials = poses.size();
     if (poses.size() >= model.least_trials_) {
       Stream stream({.run_seed = settings.seed,
@@ -77,9 +71,7 @@ Result<MotionModel> MotionModel::mine(const TrialLog& log, std::span<const Comma
 }
 
 Result<const CommandMotion*> MotionModel::find(const CommandSpec& command) const {
-  const auto found = std::find_if(
-      commands_.begin(), commands_.end(),
-      [&](const CommandMotion& motion) { return key_of(motion.command) == key_of(command); });
+  const auto found = std::ranges::find(commands_, command, &CommandMotion::command);
   const std::size_t trials = found == commands_.end() ? 0 : found->trials;
   if (trials < least_trials_) {
     return Error{describe(command) + ": the log has " + std::to_string(trials) +
