@@ -48,35 +48,14 @@ bool comes_apart(FitnessKind kind) {
 }
 
 const char* fitness_name(FitnessKind kind) {
-  switch (kind) {
-    case FitnessKind::kLogScore:
-      return "log_score";
-    case FitnessKind::kRobustMahalanobis:
-      return "robust_mahalanobis";
-    case FitnessKind::kEnergyScore:
-      return "energy_score";
-    case FitnessKind::kCornerDistance:
-      return "corner_distance";
-    case FitnessKind::kLeastValue:
-    case FitnessKind::kGreatestValue:
-      return "value";
-  }
-  return "?";
+  static constexpr const char* kNames[] = {
+      "log_score", "robust_mahalanobis", "energy_score", "corner_distance", "value", "value"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 const char* fitness_unit(FitnessKind kind) {
-  switch (kind) {
-    case FitnessKind::kLogScore:
-      return "nats/trial";
-    case FitnessKind::kRobustMahalanobis:
-    case FitnessKind::kLeastValue:
-    case FitnessKind::kGreatestValue:
-      return "-";
-    case FitnessKind::kEnergyScore:
-    case FitnessKind::kCornerDistance:
-      return "m";
-  }
-  return "?";
+  static constexpr const char* kUnits[] = {"nats/trial", "-", "m", "m", "-", "-"};
+  return kUnits[static_cast<std::size_t>(kind)];
 }
 
 const ParameterTable& Simulated::table() const {
