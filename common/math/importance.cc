@@ -6,17 +6,15 @@
 #include <numeric>
 #include <vector>
 
+#include "common/math/statistics.h"
+
 namespace gapfarm {
 namespace {
 
-double mean_of(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
 double squares_about_mean(std::span<const double> values) {
-  const double mean = mean_of(values);
+  const double middle = mean(values);
   double sum = 0;
-  for (const double v : values) sum += (v - mean) * (v - mean);
+  for (const double v : values) sum += (v - middle) * (v - middle);
   return sum;
 }
 

@@ -21,6 +21,7 @@ using Index = Eigen::Index;
 constexpr double kSingularShare = 1e-14;
 // A dimension's spread is judged against at least this share of its magnitude.
 constexpr double kConstantShare = 1e-8;
+constexpr std::size_t kFinalists = 10;  // of the starts, run to convergence
 
 struct Fit {
   Eigen::VectorXd mean;
@@ -121,7 +122,7 @@ class Concentration {
       const bool known = contains(best, fit.subset, &Fit::subset);
       if (known) continue;
       best.insert(std::upper_bound(best.begin(), best.end(), fit, better), fit);
-      if (best.size() > std::max(1U, settings.finalists)) best.pop_back();
+      if (best.size() > kFinalists) best.pop_back();
     }
     for (Fit& fit : best) {
       for (int k = 0; k < 100; ++k) {
@@ -141,8 +142,7 @@ class Concentration {
   Eigen::VectorXd scale_;  // variance of each dimension
 };
 
-Eigen::VectorXd ridge_variances(const Eigen::MatrixXd& points, const McdSettings& settings) {
-  const bool given = settings.resolution.size() == points.rows();
+Eigen::VectorXd ridge_variances(const Eigen::MatrixXd& points) {
   Eigen::VectorXd ridge(points.rows());
   for (Index row = 0; row < points.rows(); ++row) {
     std::vector<double> sorted(static_cast<std::size_t>(points.cols()));
@@ -154,7 +154,7 @@ Eigen::VectorXd ridge_variances(const Eigen::MatrixXd& points, const McdSettings
       const double step = sorted[i] - sorted[i - 1];
       if (step > 1e-9 * range) gap = std::min(gap, step);
     }
-    const double resolution = given ? settings.resolution[row] : gap / std::sqrt(12.0);
+    const double resolution = gap / std::sqrt(12.0);
     const double magnitude = std::max(std::abs(sorted.front()), std::abs(sorted.back()));
     const double sd = std::max({resolution, 1e-6 * range, 1e-9, kConstantShare * magnitude});
     ridge[row] = sd * sd;
@@ -162,7 +162,7 @@ Eigen::VectorXd ridge_variances(const Eigen::MatrixXd& points, const McdSettings
   return ridge;
 }
 
-RobustEstimate plain_estimate(const Eigen::MatrixXd& points, const McdSettings& settings) {
+RobustEstimate plain_estimate(const Eigen::MatrixXd& points) {
   const auto n = static_cast<std::size_t>(points.cols());
   std::vector<std::size_t> all(n);
   std::iota(all.begin(), all.end(), std::size_t{0});
@@ -171,8 +171,8 @@ RobustEstimate plain_estimate(const Eigen::MatrixXd& points, const McdSettings& 
   RobustEstimate result;
   result.outcome = McdOutcome::kTooFew;
   result.covariance = fit.covariance * unbias;
-  if (fit.singular()) result.covariance.diagonal() += ridge_variances(points, settings);
-  result.mean = result.raw_mean = fit.mean;
+  if (fit.singular()) result.covariance.diagonal() += ridge_variances(points);
+  result.mean = fit.mean;
   result.raw_covariance = result.covariance;
   result.raw_log_determinant = std::log(result.covariance.determinant());
   result.support = std::move(all);
@@ -263,7 +263,7 @@ RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settin
   const auto n = static_cast<std::size_t>(points.cols());
   const int p = static_cast<int>(points.rows());
   const auto dimension = static_cast<std::size_t>(p);
-  if (n < 2 * (dimension + 1)) return plain_estimate(points, settings);
+  if (n < 2 * (dimension + 1)) return plain_estimate(points);
 
   const std::size_t half = (n + dimension + 1) / 2;
   const std::size_t support = std::clamp(settings.support.value_or(half), half, n);
@@ -274,12 +274,11 @@ RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settin
   Fit fit = Concentration(points, support, ridge).search(settings, stream);
   if (fit.singular()) {
     result.outcome = McdOutcome::kSingular;
-    ridge = ridge_variances(points, settings);
+    ridge = ridge_variances(points);
     fit = Concentration(points, support, ridge).search(settings, stream);
     assert(!fit.singular());
   }
   result.raw_log_determinant = fit.log_determinant;
-  result.raw_mean = fit.mean;
   fit.covariance *= mcd_consistency(share, p) * mcd_small_sample_raw(n, p, share);
   result.raw_covariance = fit.covariance;
 

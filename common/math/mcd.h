@@ -16,21 +16,18 @@ struct McdSettings {
   // Points in the concentrated half; none: floor((n + p + 1) / 2), the greatest breakdown point.
   // Clamped to [floor((n + p + 1) / 2), n].
   std::optional<std::size_t> support = std::nullopt;
-  unsigned starts = 500;             // random (p + 1)-subsets, two C-steps each
-  unsigned finalists = 10;           // best of them, run to convergence
+  unsigned starts = 500;  // random (p + 1)-subsets, two C-steps each; the best of them go on
   double reweight_quantile = 0.975;  // of chi-square with p degrees of freedom
-  // s.d. added to each dimension when the data are singular (resolution of the measurement, in the
-  // dimension's unit).  Empty: the smallest step between two values of the dimension over sqrt(12),
-  // both raised to 1e-6 of its range, 1e-8 of its magnitude and 1e-9.
-  Eigen::VectorXd resolution = Eigen::VectorXd();
 };
 
 enum class McdOutcome {
   kRegular,
   // At least `support` points lie on a hyperplane (a constant column, coarse readings), so the
-  // least determinant is zero: resolution^2 was added to the diagonal of every covariance.
+  // least determinant is zero: to the diagonal of every covariance the square of the data's
+  // resolution was added, the smallest step between two values of a dimension over sqrt(12), raised
+  // to 1e-6 of its range, 1e-8 of its magnitude and 1e-9.
   kSingular,
-  // Fewer than 2 (p + 1) points: the plain mean and covariance, with resolution^2 added when
+  // Fewer than 2 (p + 1) points: the plain mean and covariance, with the same added when
   // singular; nothing was trimmed.
   kTooFew,
 };
@@ -43,7 +40,6 @@ struct RobustEstimate {
   Eigen::MatrixXd covariance;
   // Of the concentrated half: consistent at the normal (c(h) = (h/n) / P(chi2_{p+2} < q_{h/n}),
   // Croux and Haesbroeck 1999) and corrected for small samples (Pison, Van Aelst and Willems 2002).
-  Eigen::VectorXd raw_mean;
   Eigen::MatrixXd raw_covariance;
   double raw_log_determinant = 0;    // of the uncorrected covariance of the half, ridge included
   std::vector<std::size_t> support;  // indices of the half, ascending

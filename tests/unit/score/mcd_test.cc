@@ -158,15 +158,6 @@ TEST(Mcd, WholeCentimetresAreUsable) {
   EXPECT_LT(robust.covariance(0, 0), 1.2e-4);
 }
 
-TEST(Mcd, GivenResolutionIsTheRidge) {
-  Eigen::MatrixXd points = Eigen::MatrixXd::Constant(3, 20, 0.25);
-  const RobustEstimate robust =
-      estimate(points, {.resolution = Eigen::Vector3d(0.003, 0.003, 0.01)});
-  EXPECT_EQ(robust.outcome, McdOutcome::kSingular);
-  EXPECT_NEAR(robust.covariance(0, 0), 9e-6, 1e-12);
-  EXPECT_NEAR(robust.covariance(2, 2), 1e-4, 1e-12);
-}
-
 TEST(Mcd, CollinearPointsAreSingularButUsable) {
   Stream draws = stream(7);
   Eigen::MatrixXd points = normal_points(3, 40, draws);
