@@ -65,6 +65,18 @@ Eigen::Matrix3d carry(const Pose& X_AB) {
   return J;
 }
 
+Eigen::Matrix3d rotation_about_z(double angle_rad) {
+  const double c = std::cos(angle_rad), s = std::sin(angle_rad);
+  Eigen::Matrix3d rotation;
+  rotation << c, -s, 0, s, c, 0, 0, 0, 1;
+  return rotation;
+}
+
+Eigen::Matrix3d rotate_covariance(const Eigen::Matrix3d& covariance, double angle_rad) {
+  const Eigen::Matrix3d rotation = rotation_about_z(angle_rad);
+  return rotation * covariance * rotation.transpose();
+}
+
 Pose mirrored(const Pose& X) { return {X.x, -X.y, wrap_angle(-X.theta)}; }
 
 }  // namespace gapfarm

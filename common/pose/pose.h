@@ -39,6 +39,11 @@ Eigen::Vector3d local_difference(const Pose& predicted, const Pose& measured);
 // How a small motion (m, m, rad) of A in its own axes moves B, in B's axes: the adjoint of X_BA.
 Eigen::Matrix3d carry(const Pose& X_AB);
 
+// A covariance (m, m, rad) seen from axes in which the present ones point at `angle_rad`: end axes
+// to world axes by the end's heading, start axes to world axes by the start's.
+Eigen::Matrix3d rotate_covariance(const Eigen::Matrix3d& covariance, double angle_rad);
+Eigen::Matrix3d rotation_about_z(double angle_rad);
+
 // The reflection in the robot's own x-z plane: (x, -y, -theta).
 Pose mirrored(const Pose& X);
 

@@ -14,14 +14,6 @@ constexpr const char* kNoMatch =
     "a row whose match failed has no increment; name what lies before and behind it two runs";
 constexpr double kLeastShare = 1e-9;  // of a correlation matrix's determinant
 
-Eigen::Matrix3d turn(double theta) {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R(0, 0) = R(1, 1) = std::cos(theta);
-  R(0, 1) = -std::sin(theta);
-  R(1, 0) = std::sin(theta);
-  return R;
-}
-
 }  // namespace
 
 Eigen::Matrix3d noise_of(std::span<const double> columns) {
@@ -68,12 +60,7 @@ Eigen::Matrix3d chained_noise(const Pose& X_AB, const Eigen::Matrix3d& of_AB, co
   Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
   J(0, 2) = -(X_AC.y - X_AB.y);
   J(1, 2) = X_AC.x - X_AB.x;
-  return J * of_AB * J.transpose() + turned_noise(of_BC, -X_AB.theta);
-}
-
-Eigen::Matrix3d turned_noise(const Eigen::Matrix3d& noise, double theta) {
-  const Eigen::Matrix3d R = turn(-theta);
-  return R * noise * R.transpose();
+  return J * of_AB * J.transpose() + rotate_covariance(of_BC, X_AB.theta);
 }
 
 }  // namespace gapfarm

@@ -31,7 +31,4 @@ std::optional<NoiseFault> fault_of_noise(std::span<const double> columns);
 Eigen::Matrix3d chained_noise(const Pose& X_AB, const Eigen::Matrix3d& of_AB, const Pose& X_BC,
                               const Eigen::Matrix3d& of_BC);
 
-// The same covariance seen in axes that are turned by `theta` (rad).
-Eigen::Matrix3d turned_noise(const Eigen::Matrix3d& noise, double theta);
-
 }  // namespace gapfarm

@@ -22,13 +22,6 @@ Result<double> mean_score(std::span<const ScoredTrial> trials, ScoreOne score_on
   return sum / static_cast<double>(trials.size());
 }
 
-Eigen::Matrix3d rotation_about_z(double angle_rad) {
-  const double c = std::cos(angle_rad), s = std::sin(angle_rad);
-  Eigen::Matrix3d rotation;
-  rotation << c, -s, 0, s, c, 0, 0, 0, 1;
-  return rotation;
-}
-
 }  // namespace
 
 Result<double> log_score(std::span<const ScoredTrial> trials, double outlier_share) {
@@ -55,11 +48,6 @@ Eigen::Matrix3d predictive_covariance(const Pose& X_SE, const Eigen::Matrix3d& d
   Eigen::Matrix3d covariance = drive_covariance + J * variances.asDiagonal() * J.transpose();
   covariance.diagonal() += variances;
   return covariance;
-}
-
-Eigen::Matrix3d rotate_covariance(const Eigen::Matrix3d& covariance, double angle_rad) {
-  const Eigen::Matrix3d rotation = rotation_about_z(angle_rad);
-  return rotation * covariance * rotation.transpose();
 }
 
 Result<double> robust_distance(const Pose& X_SE, const RealMotion& real) {

@@ -45,10 +45,6 @@ struct PoseNoise {
 Eigen::Matrix3d predictive_covariance(const Pose& X_SE, const Eigen::Matrix3d& drive_covariance,
                                       const PoseNoise& noise);
 
-// The same covariance seen from axes in which the present ones point at `angle_rad`:
-// end axes to world axes by the end's heading, start axes to world axes by the start's.
-Eigen::Matrix3d rotate_covariance(const Eigen::Matrix3d& covariance, double angle_rad);
-
 // The thesis's fitness: how far simulated end poses lie from the robust distribution of real ones,
 // with penalties for motions that the real robot cannot make.  Pure functions over plain inputs.
 

@@ -48,7 +48,7 @@ std::optional<Eigen::Matrix3d> noise_of_window(const LoggedRun& run, const Trial
     noise = chained_noise(X, noise, step, *run.poses[k].noise);
     X = X * step;
   }
-  return turned_noise(noise, X.theta);
+  return rotate_covariance(noise, -X.theta);
 }
 
 // What a gyro turned by between two times, its rates straight on between; none over a gap.

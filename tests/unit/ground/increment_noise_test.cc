@@ -26,7 +26,7 @@ TEST(IncrementNoise, AddsUpAlongItsWay) {
   EXPECT_NEAR(all(1, 1), 4e-4 + 1e-6, 1e-12);
   EXPECT_NEAR(all(2, 2), 9e-4 + 3e-6, 1e-12);
   EXPECT_NEAR(all(0, 2), -2 * 9e-4, 1e-12);
-  EXPECT_NEAR(turned_noise(a, std::acos(0.0))(0, 0), 4e-4, 1e-12);
+  EXPECT_NEAR(rotate_covariance(a, -std::acos(0.0))(0, 0), 4e-4, 1e-12);
 }
 
 // A row of a run with such columns; what a run begins with leads on from nowhere, and says nothing.
