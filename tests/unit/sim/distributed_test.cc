@@ -15,6 +15,24 @@ PushSettings on_face(PushSettings settings) {
   return settings;
 }
 
+// Force (N over the weight times the friction, in the axes of the points) and moment (m, same,
+// about `centre`) with which even Coulomb friction resists a face that moves at `velocity` at
+// `centre` and turns at `spin`.
+Eigen::Vector3d face_resistance(const std::vector<FacePoint>& face, const Eigen::Vector2d& centre,
+                                const Eigen::Vector2d& velocity, double spin) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const FacePoint& point : face) {
+    const Eigen::Vector2d r = point.p - centre;
+    const Eigen::Vector2d u = velocity + spin * Eigen::Vector2d(-r[1], r[0]);
+    const double turned = point.extent_m * spin;
+    const double speed = std::sqrt(u.squaredNorm() + turned * turned);
+    if (speed == 0) continue;
+    const double moment = r[0] * u[1] - r[1] * u[0] + point.extent_m * turned;
+    sum -= point.share / speed * Eigen::Vector3d(u[0], u[1], moment);
+  }
+  return sum;
+}
+
 // A disc as a polygon, whose radius is that of a disc of the same area.
 PushSettings disc_piece(double radius) {
   PushSettings s = on_face({});
@@ -33,7 +51,7 @@ PushSettings disc_piece(double radius) {
 
 Motion on_face_pushed(const PushSettings& settings, const std::vector<FingerSample>& finger,
                       const Floor& table = {}) {
-  return PushSimulator(settings).run(finger, table);
+  return make_push_simulator(settings)->run(finger, table);
 }
 
 // Over mu m g.
@@ -117,7 +135,7 @@ TEST(DistributedSlide, StopsAfterTheCoulombDistance) {
   PushSettings settings = on_face(square_piece());
   settings.step_rate_hz = 480;
   for (const double speed : {0.2, 1.0}) {
-    const Motion motion = PushSimulator(settings).slide({0.6 * speed, 0.8 * speed}, 0, {});
+    const Motion motion = make_push_simulator(settings)->slide({0.6 * speed, 0.8 * speed}, 0, {});
     ASSERT_EQ(motion.outcome, MotionOutcome::kOk);
     const double expected = speed * speed / (2 * settings.ground_friction * kEarth_m_s2);
     EXPECT_NEAR(std::hypot(motion.X_SE.x, motion.X_SE.y), expected, speed / 960 + 1e-5);
@@ -130,7 +148,7 @@ TEST(DistributedSlide, ADiscsSpinStopsAfterTheCoulombAngle) {
   PushSettings settings = disc_piece(0.05);
   settings.step_rate_hz = 960;
   const double spin = 6;
-  const Motion motion = PushSimulator(settings).slide({0, 0}, spin, {});
+  const Motion motion = make_push_simulator(settings)->slide({0, 0}, spin, {});
   const double expected = settings.gyration_m2 * spin * spin /
                           (2 * settings.ground_friction * kEarth_m_s2 * 2.0 / 3 * 0.05);
   EXPECT_NEAR(motion.X_SE.theta, expected, spin / 1920 + 1e-4);
@@ -141,14 +159,14 @@ TEST(DistributedSlide, ADiscsSpinStopsAfterTheCoulombAngle) {
 TEST(DistributedSlide, NeverGainsEnergyAndGoesFartherWhenItSpins) {
   std::vector<MotionSample> path;
   for (const double spin : {0.0, 4.0, -9.0}) {
-    PushSimulator(on_face(triangle_piece())).slide({0.7, -0.4}, spin, {}, &path, 1.0 / 240);
+    make_push_simulator(on_face(triangle_piece()))->slide({0.7, -0.4}, spin, {}, &path, 1.0 / 240);
     ASSERT_GT(path.size(), 10u);
     for (std::size_t i = 1; i < path.size(); ++i) {
       EXPECT_LE(path[i].kinetic_energy_j, path[i - 1].kinetic_energy_j + 1e-12) << i;
     }
   }
-  const double straight_m = PushSimulator(disc_piece(0.05)).slide({0.5, 0}, 0, {}).X_SE.x;
-  const double spinning_m = PushSimulator(disc_piece(0.05)).slide({0.5, 0}, 20, {}).X_SE.x;
+  const double straight_m = make_push_simulator(disc_piece(0.05))->slide({0.5, 0}, 0, {}).X_SE.x;
+  const double spinning_m = make_push_simulator(disc_piece(0.05))->slide({0.5, 0}, 20, {}).X_SE.x;
   EXPECT_GT(spinning_m, 1.2 * straight_m);
 }
 

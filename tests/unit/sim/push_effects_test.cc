@@ -9,7 +9,7 @@ constexpr double kGravity = 9.81;
 
 double slide_distance(const PushSettings& settings, const Eigen::Vector2d& velocity,
                       const Floor& table) {
-  const Motion motion = PushSimulator(settings).slide(velocity, 0, table);
+  const Motion motion = make_push_simulator(settings)->slide(velocity, 0, table);
   EXPECT_EQ(motion.outcome, MotionOutcome::kOk);
   return std::hypot(motion.X_SE.x, motion.X_SE.y);
 }
@@ -79,11 +79,11 @@ TEST_P(PushEffects, TableTiltSlidesAboveTheAngleOfFriction) {
   const auto nothing = straight(5, 5, 6, 1);
   Floor table;
   table.tilt_rad = std::atan(0.95 * settings.ground_friction);
-  const Motion holds = PushSimulator(settings).run(nothing, table);
+  const Motion holds = make_push_simulator(settings)->run(nothing, table);
   EXPECT_EQ(holds.outcome, MotionOutcome::kOk);
   EXPECT_NEAR(holds.X_SE.x, 0, 5e-4);
   table.tilt_rad = std::atan(1.05 * settings.ground_friction);
-  const Motion slips = PushSimulator(settings).run(nothing, table);
+  const Motion slips = make_push_simulator(settings)->run(nothing, table);
   EXPECT_EQ(slips.outcome, MotionOutcome::kNeverRested);
   EXPECT_GT(slips.X_SE.x, 0.02);
 }
@@ -101,9 +101,9 @@ TEST_P(PushEffects, TableTiltLengthensADownhillSlideByTheClosedForm) {
 TEST_P(PushEffects, ComOffsetAPushThroughTheMovedCentreDoesNotTurn) {
   PushSettings settings = square();
   settings.com_x_m = 0.01;
-  PushSimulator simulator(settings);
-  EXPECT_NEAR(simulator.run(straight(0.01, -0.1, 0.02, 0.05), {}).X_SE.theta, 0, 2e-3);
-  EXPECT_LT(simulator.run(straight(0, -0.1, 0.02, 0.05), {}).X_SE.theta, -0.02);
+  const auto simulator = make_push_simulator(settings);
+  EXPECT_NEAR(simulator->run(straight(0.01, -0.1, 0.02, 0.05), {}).X_SE.theta, 0, 2e-3);
+  EXPECT_LT(simulator->run(straight(0, -0.1, 0.02, 0.05), {}).X_SE.theta, -0.02);
 }
 
 // Longer one way is narrower the other.
@@ -111,10 +111,10 @@ TEST(PressureDistribution, StretchingOneWayIsShrinkingTheOther) {
   PushSettings settings = square_piece();
   const auto finger = straight(0.03, -0.1, 0.02, 0.05);
   settings.stretch = 0.5;
-  const Motion longer = PushSimulator(settings).run(finger, {});
+  const Motion longer = make_push_simulator(settings)->run(finger, {});
   settings.stretch = -0.5;
   settings.stretch_direction_rad = M_PI / 2;
-  const Motion narrower = PushSimulator(settings).run(finger, {});
+  const Motion narrower = make_push_simulator(settings)->run(finger, {});
   EXPECT_NEAR(longer.X_SE.x, narrower.X_SE.x, 1e-4);
   EXPECT_NEAR(longer.X_SE.theta, narrower.X_SE.theta, 1e-3);
 }
@@ -129,7 +129,7 @@ TEST(PressureDistribution, StopsASpinByTheClosedForm) {
   const double spin = 3;
   const double expected =
       settings.gyration_m2 * spin * spin / (2 * settings.ground_friction * kGravity * radius);
-  EXPECT_NEAR(PushSimulator(settings).slide({0, 0}, spin, {}).X_SE.theta, expected, 5e-3);
+  EXPECT_NEAR(make_push_simulator(settings)->slide({0, 0}, spin, {}).X_SE.theta, expected, 5e-3);
 }
 
 // A steady push needs mu m g, so the finger, and the piece with it, stays behind by that over the
@@ -138,9 +138,9 @@ TEST_P(PushEffects, FingerComplianceAPieceStaysBehindByForceTimesCompliance) {
   PushSettings settings = square();
   // Slowly: with its mass on the spring it overshoots by v sqrt(m C).
   const auto finger = straight(0, -0.07, -0.04, 0.002);
-  const double stiff = PushSimulator(settings).run(finger, {}).X_SE.y;
+  const double stiff = make_push_simulator(settings)->run(finger, {}).X_SE.y;
   settings.finger_compliance_m_n = 0.01;
-  const double soft = PushSimulator(settings).run(finger, {}).X_SE.y;
+  const double soft = make_push_simulator(settings)->run(finger, {}).X_SE.y;
   const double force = settings.ground_friction * settings.mass_kg * kGravity;
   EXPECT_NEAR(stiff - soft, settings.finger_compliance_m_n * force, 4e-4);
 }

@@ -15,7 +15,7 @@ constexpr double kGravity = 9.81;
 
 Motion pushed(const PushSettings& settings, const std::vector<FingerSample>& finger,
               const Floor& table = {}) {
-  return PushSimulator(settings).run(finger, table);
+  return make_push_simulator(settings)->run(finger, table);
 }
 
 TEST(Outline, NearestPointAndNormalOutsideInsideAndAtACorner) {
@@ -39,7 +39,7 @@ TEST(FreeSlide, StopsAfterTheCoulombDistance) {
       PushSettings settings = square_piece();
       settings.ground_friction = friction;
       settings.step_rate_hz = 480;
-      const Motion motion = PushSimulator(settings).slide({0.6 * speed, 0.8 * speed}, 0, {});
+      const Motion motion = make_push_simulator(settings)->slide({0.6 * speed, 0.8 * speed}, 0, {});
       ASSERT_EQ(motion.outcome, MotionOutcome::kOk);
       const double expected = speed * speed / (2 * friction * kGravity);
       // Steps lose up to v dt / 2 of it.
@@ -57,7 +57,7 @@ TEST(FreeSlide, SpinStopsAfterTheCoulombAngle) {
   settings.step_rate_hz = 480;
   const double spin = 3;
   const double radius = settings.shape_factor * 0.06 * std::sqrt(2.0);
-  const Motion motion = PushSimulator(settings).slide({0, 0}, spin, {});
+  const Motion motion = make_push_simulator(settings)->slide({0, 0}, spin, {});
   const double expected =
       settings.gyration_m2 * spin * spin / (2 * settings.ground_friction * kGravity * radius);
   EXPECT_NEAR(motion.X_SE.theta, expected, spin / 480 + 1e-3);
@@ -67,7 +67,7 @@ TEST(FreeSlide, SpinStopsAfterTheCoulombAngle) {
 TEST(FreeSlide, NeverGainsEnergy) {
   std::vector<MotionSample> path;
   for (const double spin : {0.0, 4.0, -9.0}) {
-    PushSimulator(triangle_piece()).slide({0.7, -0.4}, spin, {}, &path, 1.0 / 240);
+    make_push_simulator(triangle_piece())->slide({0.7, -0.4}, spin, {}, &path, 1.0 / 240);
     ASSERT_GT(path.size(), 10u);
     for (std::size_t i = 1; i < path.size(); ++i) {
       EXPECT_LE(path[i].kinetic_energy_j, path[i - 1].kinetic_energy_j + 1e-7) << i;
@@ -80,7 +80,7 @@ TEST(FreeSlide, NeverGainsEnergy) {
 TEST(Push, APieceIsNotFlungByItsFinger) {
   std::vector<MotionSample> path;
   const double speed = 0.1;
-  PushSimulator(square_piece()).run(straight(0.03, -0.1, 0.1, speed), {}, &path, 0.01);
+  make_push_simulator(square_piece())->run(straight(0.03, -0.1, 0.1, speed), {}, &path, 0.01);
   const double limit = 0.15 * speed * speed * 2;
   for (const MotionSample& sample : path) EXPECT_LT(sample.kinetic_energy_j, limit);
 }

@@ -47,15 +47,15 @@ inline void expect_answers_of_a_new_one(const PushSettings& settings) {
   Floor rough;
   rough.grain_ratio = 1.7;
   rough.speed_slope_s_m = 2;
-  const Motion fresh = PushSimulator(settings).run(finger, rough);
-  PushSimulator used(settings);
+  const Motion fresh = make_push_simulator(settings)->run(finger, rough);
+  const auto used = make_push_simulator(settings);
   Floor steep;
   steep.tilt_rad = 1.2;
-  used.run(finger, steep);
-  used.slide({1, 2}, 30, {});
-  used.slide({INFINITY, 0}, 0, {});
-  used.run(straight(-0.05, -0.1, 0.1, 0.4), {});
-  const Motion again = used.run(finger, rough);
+  used->run(finger, steep);
+  used->slide({1, 2}, 30, {});
+  used->slide({INFINITY, 0}, 0, {});
+  used->run(straight(-0.05, -0.1, 0.1, 0.4), {});
+  const Motion again = used->run(finger, rough);
   EXPECT_EQ(again.X_SE, fresh.X_SE);
   EXPECT_EQ(again.duration_s, fresh.duration_s);
 }

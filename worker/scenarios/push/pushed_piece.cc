@@ -55,7 +55,7 @@ PushedPiece::PushedPiece(const Piece& piece, std::size_t index, const ParameterV
       effects_(push_table(), values),
       camera_scale_(at(values, gapfarm::Push::kCameraScale)),
       X_RC_{centroid(piece)[0], centroid(piece)[1], 0},
-      simulator_(push_settings(piece, index, values, effects_)) {}
+      simulator_(make_push_simulator(push_settings(piece, index, values, effects_))) {}
 
 Pose PushedPiece::start_of(const Pose& X_WM) const {
   return effects_.place(
@@ -82,7 +82,7 @@ Motion PushedPiece::simulate(const Pose& X_WS, std::span<const TipSample> tip, c
     const Pose p_SF = between(X_WS, {sample.x, sample.y, 0});
     finger.push_back({sample.t_s, {p_SF.x, p_SF.y}});
   }
-  return simulator_.run(finger, table, samples, interval_s);
+  return simulator_->run(finger, table, samples, interval_s);
 }
 
 PushedPiece::Push PushedPiece::pushed(const Pose& X_WS, const Motion& motion) {
@@ -110,7 +110,7 @@ PushedPiece::Push PushedPiece::push(const Pose& X_WR, std::uint32_t trial,
                                     std::span<const TipSample> tip, MotionMemo<PushKey>* memo) {
   if (memo == nullptr) return push(X_WR, tip);
   const Pose X_WS = X_WR * X_RC_;
-  const PushKey key{trial, simulator_.settings(), X_WS, table_at(X_WS)};
+  const PushKey key{trial, simulator_->settings(), X_WS, table_at(X_WS)};
   if (const auto known = memo->find(key)) return pushed(X_WS, *known);
   const Motion motion = simulate(X_WS, tip, key.table);
   memo->keep(key, motion);

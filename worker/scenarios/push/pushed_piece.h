@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -73,7 +74,7 @@ class PushedPiece {
   ActiveEffects effects_;
   double camera_scale_;  // logged lengths over true ones
   Pose X_RC_;            // centroid in the log's frame
-  PushSimulator simulator_;
+  std::unique_ptr<PushSimulator> simulator_;
   double simulated_s_ = 0;
   unsigned runs_ = 0;
 };

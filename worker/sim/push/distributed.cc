@@ -25,10 +25,10 @@ Eigen::Vector2d turned(double angle, const Eigen::Vector2d& d) {
   return {c * d[0] - s * d[1], s * d[0] + c * d[1]};
 }
 
-class DistributedPush final : public PushSimulator::Engine {
+class DistributedPush final : public PushSimulator {
  public:
   explicit DistributedPush(const PushSettings& settings)
-      : Engine(settings),
+      : PushSimulator(settings),
         face_(face_points(settings)),
         centre_(settings.com_x_m, settings.com_y_m),
         step_(settings.mass_kg, settings.mass_kg * settings.gyration_m2) {}
@@ -232,7 +232,7 @@ Motion DistributedPush::follow(const FingerPath& finger_path, bool at_rest,
 
 }  // namespace
 
-std::unique_ptr<PushSimulator::Engine> make_distributed_push(const PushSettings& settings) {
+std::unique_ptr<PushSimulator> make_distributed_push(const PushSettings& settings) {
   return std::make_unique<DistributedPush>(settings);
 }
 

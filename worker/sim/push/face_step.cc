@@ -287,18 +287,4 @@ std::vector<FacePoint> face_points(const PushSettings& settings) {
   return face;
 }
 
-Eigen::Vector3d face_resistance(const std::vector<FacePoint>& face, const Eigen::Vector2d& centre,
-                                const Eigen::Vector2d& velocity, double spin) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const FacePoint& point : face) {
-    const Eigen::Vector2d r = point.p - centre;
-    const Eigen::Vector2d u = velocity + spin * Eigen::Vector2d(-r[1], r[0]);
-    const double turned = point.extent_m * spin;
-    const double speed = std::sqrt(u.squaredNorm() + turned * turned);
-    if (speed == 0) continue;
-    sum -= point.share / speed * Eigen::Vector3d(u[0], u[1], cross(r, u) + point.extent_m * turned);
-  }
-  return sum;
-}
-
 }  // namespace gapfarm

@@ -88,10 +88,4 @@ struct FacePoint {
 // first order as on an elastic table, until its centre is there.
 std::vector<FacePoint> face_points(const PushSettings& settings);
 
-// Force (N over the weight times the friction, in the axes of the points) and moment (m, same,
-// about `centre`) with which even Coulomb friction resists a face that moves at `velocity` at
-// `centre` and turns at `spin`.
-Eigen::Vector3d face_resistance(const std::vector<FacePoint>& face, const Eigen::Vector2d& centre,
-                                const Eigen::Vector2d& velocity, double spin);
-
 }  // namespace gapfarm

@@ -19,10 +19,10 @@ namespace {
 
 constexpr double kStride_m = 1e-4;  // the finger's way is cut into pieces no longer than this
 
-class LimitSurface final : public PushSimulator::Engine {
+class LimitSurface final : public PushSimulator {
  public:
   explicit LimitSurface(const PushSettings& settings)
-      : Engine(settings), centre_(settings.com_x_m, settings.com_y_m) {
+      : PushSimulator(settings), centre_(settings.com_x_m, settings.com_y_m) {
     // As many equally loaded supports: m_max = f_max times their mean distance.
     double sum = 0;
     const auto supports = support_corners(settings);
@@ -112,7 +112,7 @@ class LimitSurface final : public PushSimulator::Engine {
 
 }  // namespace
 
-std::unique_ptr<PushSimulator::Engine> make_limit_surface(const PushSettings& settings) {
+std::unique_ptr<PushSimulator> make_limit_surface(const PushSettings& settings) {
   return std::make_unique<LimitSurface>(settings);
 }
 

@@ -16,9 +16,9 @@ namespace {
 constexpr double kApproach_m = 2e-3;
 constexpr int kSettleSteps = 8;
 
-class BulletPush final : public PushSimulator::Engine {
+class BulletPush final : public PushSimulator {
  public:
-  explicit BulletPush(const PushSettings& settings) : Engine(settings), world_(settings) {}
+  explicit BulletPush(const PushSettings& settings) : PushSimulator(settings), world_(settings) {}
 
   Motion run(std::span<const FingerSample> finger, const Floor& table,
              std::vector<MotionSample>* path, double interval_s) override {
@@ -182,37 +182,14 @@ void PathRecorder::finish() {
   if (path_ != nullptr && !path_->empty() && path_->back().t_s < last_.t_s) path_->push_back(last_);
 }
 
-namespace {
-
-std::unique_ptr<PushSimulator::Engine> make_engine(const PushSettings& settings) {
-  switch (settings.model) {
-    case PushModel::kBullet:
-      return make_push_world(settings);
-    case PushModel::kLimitSurface:
-      return make_limit_surface(settings);
-    case PushModel::kDistributed:
-      return make_distributed_push(settings);
-  }
-  return nullptr;
+std::unique_ptr<PushSimulator> make_push_simulator(const PushSettings& settings) {
+  // By PushModel.
+  constexpr decltype(&make_push_world) kModels[] = {make_push_world, make_limit_surface,
+                                                    make_distributed_push};
+  return kModels[static_cast<std::size_t>(settings.model)](settings);
 }
 
-}  // namespace
-
-PushSimulator::PushSimulator(const PushSettings& settings) : engine_(make_engine(settings)) {}
-PushSimulator::~PushSimulator() = default;
-const PushSettings& PushSimulator::settings() const { return engine_->settings(); }
-
-Motion PushSimulator::run(std::span<const FingerSample> finger, const Floor& table,
-                          std::vector<MotionSample>* path, double interval_s) {
-  return engine_->run(finger, table, path, interval_s);
-}
-
-Motion PushSimulator::slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
-                            std::vector<MotionSample>* path, double interval_s) {
-  return engine_->slide(velocity, spin, table, path, interval_s);
-}
-
-std::unique_ptr<PushSimulator::Engine> make_push_world(const PushSettings& settings) {
+std::unique_ptr<PushSimulator> make_push_world(const PushSettings& settings) {
   return std::make_unique<BulletPush>(settings);
 }
 

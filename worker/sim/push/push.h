@@ -65,27 +65,28 @@ std::vector<Eigen::Vector2d> support_corners(const PushSettings& settings);
 // the same settings in a new process, whatever was run before.  One thread at a time.
 class PushSimulator {
  public:
-  // REQUIRES: settings within the bounds of the parameter table.
-  explicit PushSimulator(const PushSettings& settings);
-  ~PushSimulator();
+  virtual ~PushSimulator() = default;
   PushSimulator& operator=(PushSimulator&&) = delete;
 
-  const PushSettings& settings() const;
+  const PushSettings& settings() const { return settings_; }
 
   // From rest at the origin of S, through the finger's way (straight between samples, and standing
   // still after the last), until the piece rests.  X_SE of the result and X_SB of the samples are
   // the centroid's poses.  REQUIRES: at least two samples at increasing times.
-  Motion run(std::span<const FingerSample> finger, const Floor& table,
-             std::vector<MotionSample>* path = nullptr, double interval_s = 0);
+  virtual Motion run(std::span<const FingerSample> finger, const Floor& table,
+                     std::vector<MotionSample>* path = nullptr, double interval_s = 0) = 0;
 
   // The piece slides freely from the origin of S at this velocity (m/s, rad/s) until it rests.
-  Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
-               std::vector<MotionSample>* path = nullptr, double interval_s = 0);
+  virtual Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
+                       std::vector<MotionSample>* path = nullptr, double interval_s = 0) = 0;
 
-  class Engine;  // one of the models
+ protected:
+  explicit PushSimulator(const PushSettings& settings) : settings_(settings) {}
 
- private:
-  std::unique_ptr<Engine> engine_;
+  PushSettings settings_;
 };
+
+// Of the settings' model.  REQUIRES: settings within the bounds of the parameter table.
+std::unique_ptr<PushSimulator> make_push_simulator(const PushSettings& settings);
 
 }  // namespace gapfarm

@@ -1,4 +1,4 @@
-// What a model of pushing offers, and what the models share.  Internal to worker/sim.
+// The models of pushing, and what they share.  Internal to worker/sim.
 #pragma once
 
 #include <memory>
@@ -8,23 +8,9 @@
 
 namespace gapfarm {
 
-class PushSimulator::Engine {
- public:
-  explicit Engine(const PushSettings& settings) : settings_(settings) {}
-  virtual ~Engine() = default;
-  virtual Motion run(std::span<const FingerSample> finger, const Floor& table,
-                     std::vector<MotionSample>* path, double interval_s) = 0;
-  virtual Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
-                       std::vector<MotionSample>* path, double interval_s) = 0;
-  const PushSettings& settings() const { return settings_; }
-
- protected:
-  PushSettings settings_;
-};
-
-std::unique_ptr<PushSimulator::Engine> make_push_world(const PushSettings& settings);
-std::unique_ptr<PushSimulator::Engine> make_limit_surface(const PushSettings& settings);
-std::unique_ptr<PushSimulator::Engine> make_distributed_push(const PushSettings& settings);
+std::unique_ptr<PushSimulator> make_push_world(const PushSettings& settings);
+std::unique_ptr<PushSimulator> make_limit_surface(const PushSettings& settings);
+std::unique_ptr<PushSimulator> make_distributed_push(const PushSettings& settings);
 
 // The finger's way: straight between samples, standing still before and after.
 class FingerPath {
