@@ -15,8 +15,6 @@ bool pump_in(Transport& transport, WorkerSession& session, double now) {
   return any;
 }
 
-void send(Transport& transport, v1::Envelope* envelope) { transport.send("", encode(envelope)); }
-
 void pump_out(Transport& transport, WorkerSession& session) {
   for (v1::Envelope& envelope : session.take_outbox()) {
     if (transport.send("", encode(&envelope)) != SendStatus::kSent) session.on_unsent(&envelope);

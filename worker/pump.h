@@ -8,8 +8,6 @@ namespace gapfarm {
 
 // Handles what has arrived.  True: something had.
 bool pump_in(Transport& transport, WorkerSession& session, double now);
-// One message, whatever comes of it.
-void send(Transport& transport, v1::Envelope* envelope);
 // Sends what is to be sent.
 void pump_out(Transport& transport, WorkerSession& session);
 

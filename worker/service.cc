@@ -121,7 +121,7 @@ class Service {
 
   ServiceEnd leave(ServiceEnd end, const char* reason) {
     v1::Envelope goodbye = session_.goodbye(reason);
-    send(socket_, &goodbye);
+    socket_.send("", encode(&goodbye));
     return end;
   }
 

@@ -257,7 +257,7 @@ bool SimulatedFarm::leaves(const std::shared_ptr<Worker>& worker) {
   const bool done = leaving != WorkerSession::Leaving::kNo && !worker->evaluating && empty;
   if (!done && now_ < worker->deadline) return false;
   v1::Envelope goodbye = session.goodbye("no time left");
-  send(*worker->end, &goodbye);
+  worker->end->send("", encode(&goodbye));
   end_worker(worker, EndCause::kLeft);
   return true;
 }
