@@ -8,11 +8,12 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstring>
 #include <mutex>
 #include <random>
 #include <utility>
+
+#include "common/process/process_pool.h"
 
 namespace gapfarm {
 namespace {
@@ -27,10 +28,6 @@ constexpr long kStrangersInterval_ms = 10;     // between two looks at what stra
 constexpr double kComplaintsInterval = 60;     // s, after which a peer may be named again
 constexpr std::size_t kComplaints = 10;        // in that time
 constexpr std::size_t kDescriptors = 1 << 16;  // larger ones are not accepted
-
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 // Distinguishes two connections with one descriptor; 0: no socket.
 std::uint64_t cookie_of(int fd) {
@@ -90,9 +87,9 @@ struct LinkGuard::Shared {
 
   void complain(const std::string& about, const std::string& text) {
     const std::lock_guard lock(mutex);
-    if (seconds() - named_since > kComplaintsInterval) {
+    if (monotonic_seconds() - named_since > kComplaintsInterval) {
       named.clear();
-      named_since = seconds();
+      named_since = monotonic_seconds();
     }
     if (named.size() < kComplaints && named.insert(about).second) complaints.push_back(text);
   }
@@ -159,7 +156,7 @@ class LinkGuard::Watch {
     }
     std::array<char, 41> key = {};
     zmq_z85_encode(key.data(), static_cast<const std::uint8_t*>(request[6].data()), 32);
-    if (const std::string* name = listed_.find(key.data(), seconds()); name != nullptr) {
+    if (const std::string* name = listed_.find(key.data(), monotonic_seconds()); name != nullptr) {
       *user = *name;
       return true;
     }
@@ -216,7 +213,7 @@ class LinkGuard::Watch {
 
   void mind_strangers() {
     std::erase_if(strangers_, [&](int fd) { return !shared_.strange[fd]; });
-    const double now = seconds();
+    const double now = monotonic_seconds();
     if (!strangers_.empty() && now >= next_weighing_) {
       next_weighing_ = now + 1e-3 * kStrangersInterval_ms;
       weigh_strangers();

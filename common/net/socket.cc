@@ -5,7 +5,6 @@
 #include <sys/un.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -13,6 +12,7 @@
 
 #include "common/base/try.h"
 #include "common/net/link_guard.h"
+#include "common/process/process_pool.h"
 
 namespace gapfarm {
 
@@ -50,10 +50,6 @@ constexpr int kHandshakeEvents =
     ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
     ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 }  // namespace
 
 HandshakeWatch::HandshakeWatch(zmq::context_t& context, zmq::socket_t& socket, std::string endpoint,
@@ -81,7 +77,7 @@ void HandshakeWatch::look() {
     std::memcpy(&value, static_cast<const char*>(event.data()) + sizeof kind, sizeof value);
     on_event(kind, value);
   }
-  if (retry_at_ < 0 || now_s() < retry_at_) return;
+  if (retry_at_ < 0 || monotonic_seconds() < retry_at_) return;
   retry_at_ = -1;
   zmq_disconnect(socket_.handle(), endpoint_.c_str());  // may have gone already
   socket_.connect(endpoint_);
@@ -92,7 +88,7 @@ void HandshakeWatch::on_event(unsigned event, int value) {
     last_failure_ = 0;
     return;
   }
-  if (event == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) retry_at_ = now_s() + retry_s_;
+  if (event == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) retry_at_ = monotonic_seconds() + retry_s_;
   if (event == last_failure_) return;
   last_failure_ = event;
   const std::string master = "the master at " + endpoint_;
