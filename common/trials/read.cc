@@ -202,32 +202,12 @@ Result<TrialLog> finished(TrialLog log, const Mistakes& mistakes) {
   return log;
 }
 
-Status add_text(std::string_view text, const std::string& file, TrialLog& log, AddSamples add) {
-  Mistakes mistakes(false);
-  add(text, file, {&log}, mistakes);
-  return mistakes.status();
-}
-
 }  // namespace
 
 Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
                               std::span<const std::string> commands, const ReadOptions& options) {
   Mistakes mistakes(options.skip_invalid);
   return finished(parse_trial_rows(text, file, commands, mistakes), mistakes);
-}
-
-Result<TrialLog> parse_pushes(std::string_view text, const std::string& file,
-                              std::span<const std::string> commands) {
-  Mistakes mistakes(false);
-  return finished(parse_push_rows(text, file, commands, mistakes), mistakes);
-}
-
-Status parse_paths(std::string_view text, const std::string& file, TrialLog& log) {
-  return add_text(text, file, log, add_paths);
-}
-
-Status parse_tips(std::string_view text, const std::string& file, TrialLog& log) {
-  return add_text(text, file, log, add_tips);
 }
 
 Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands) {

@@ -29,18 +29,6 @@ Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
                               std::span<const std::string> commands,
                               const ReadOptions& options = {});
 
-// The text of a pushes.csv, without its tips.  `commands`: the names of the pieces.
-Result<TrialLog> parse_pushes(std::string_view text, const std::string& file,
-                              std::span<const std::string> commands);
-
-// Adds the text of a paths.csv to the trials it names.  Rows of trials that `log` does not hold are
-// omitted, with a note: a log may be split while its paths are not.  On an error `log` is
-// unchanged.
-Status parse_paths(std::string_view text, const std::string& file, TrialLog& log);
-
-// The same of a tips.csv, whose times must increase.
-Status parse_tips(std::string_view text, const std::string& file, TrialLog& log);
-
 // A trials.csv with the paths.csv beside it that belongs to it, when there is one.
 Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands);
 

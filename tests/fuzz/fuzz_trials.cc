@@ -4,6 +4,7 @@
 
 #include "common/trials/context.h"
 #include "common/trials/read.h"
+#include "common/trials/text/trial_parser.h"
 #include "common/trials/write.h"
 #include "tests/fuzz/fuzz_target.h"
 
@@ -36,8 +37,9 @@ void check_paths(std::string_view text) {
   Trial trial;
   trial.session = "s1";
   log.trials.push_back(trial);
-  const Status status = parse_paths(text, "f", log);
-  if (!status.ok()) promise(log.trials[0].path.empty(), "nothing is half-read");
+  Mistakes mistakes(false);
+  add_paths(text, "f", {&log}, mistakes);
+  if (!mistakes.status().ok()) promise(log.trials[0].path.empty(), "nothing is half-read");
 }
 
 }  // namespace

@@ -46,7 +46,8 @@ TrialLog parse_log(const LogForm& form, std::string_view text, const std::string
 
 // Adds the samples of a paths.csv or a tips.csv to the trials of `logs` that they name.  Mistakes:
 // also a trial that has such samples already, or that two of the logs hold.  A note in the first
-// log reports rows without a trial.  Nothing is added when the text cannot be read.
+// log reports rows without a trial: a log may be split while its paths are not.  Nothing is added
+// when the text cannot be read.
 void add_paths(std::string_view text, const std::string& file, const std::vector<TrialLog*>& logs,
                Mistakes& mistakes);
 void add_tips(std::string_view text, const std::string& file, const std::vector<TrialLog*>& logs,

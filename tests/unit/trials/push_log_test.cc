@@ -75,7 +75,8 @@ TEST(PushLog, NeedsItsTips) {
 
 TEST(PushLog, TipsMustIncreaseInTime) {
   auto log = parse_pushes(kTwoPushes, "pushes.csv", kPieces);
-  const Status status = parse_tips("session,trial,t,x,y\na,0,0,0,0\na,0,0,0,1\n", "tips.csv", *log);
+  const Status status =
+      parse_samples(add_tips, "session,trial,t,x,y\na,0,0,0,0\na,0,0,0,1\n", "tips.csv", *log);
   ASSERT_FALSE(status.ok());
   EXPECT_THAT(status.error().message, StartsWith("tips.csv:3:5: found t 0 after 0"));
   EXPECT_TRUE(log->trials[0].tip.empty());

@@ -23,7 +23,7 @@ std::string error_of_row(const std::string& row) { return error_of(kHeader + "\n
 
 std::string error_of_paths(const std::string& text) {
   auto log = parse_trials(kHeader + "\n" + kRow + "\n", "log.csv", kCommands);
-  const Status status = parse_paths(text, "paths.csv", *log);
+  const Status status = parse_samples(add_paths, text, "paths.csv", *log);
   EXPECT_TRUE(log->trials[0].path.empty() || status.ok()) << "half-read";
   return status.ok() ? "no error" : status.error().message;
 }
@@ -201,9 +201,9 @@ TEST(ReadTrials, NamesOtherFormatsAndTheirImporter) {
 
 TEST(ReadPaths, AddsSamplesToTheirTrials) {
   auto log = parse_trials(kHeader + "\n" + kRow + "\n", "log.csv", kCommands);
-  const Status status =
-      parse_paths("session,trial,t,x,y,theta\ns1,0,0,0,0,0\ns9,1,0,1,1,1\ns1,0,0.1,0.02,0,0.01\n",
-                  "paths.csv", *log);
+  const Status status = parse_samples(
+      add_paths, "session,trial,t,x,y,theta\ns1,0,0,0,0,0\ns9,1,0,1,1,1\ns1,0,0.1,0.02,0,0.01\n",
+      "paths.csv", *log);
   ASSERT_TRUE(status.ok()) << status.error().message;
   ASSERT_EQ(log->trials[0].path.size(), 2u);
   EXPECT_EQ(log->trials[0].path[1].t_s, 0.1);
