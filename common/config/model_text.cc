@@ -5,7 +5,6 @@
 #include "common/base/text.h"
 #include "common/config/model.h"
 #include "common/config/sections.h"
-#include "common/config/toml_string.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 

@@ -53,15 +53,20 @@ std::string toml_type_name(const toml::node& node) {
   }
 }
 
-std::string number_range(double lower, double upper, std::string_view unit) {
-  std::string text = "a number";
-  if (std::isfinite(lower) && std::isfinite(upper)) {
-    text += " in [" + format_double(lower) + ", " + format_double(upper) + "]";
-  } else if (std::isfinite(lower)) {
-    text += " of at least " + format_double(lower);
+std::string toml_string(std::string_view text) {
+  constexpr char kHex[] = "0123456789abcdef";
+  std::string quoted = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      quoted += {'\\', c};
+    } else if (byte < 0x20 || byte == 0x7f) {
+      quoted += std::string("\\u00") + kHex[byte >> 4] + kHex[byte & 15];
+    } else {
+      quoted += c;
+    }
   }
-  if (!unit.empty()) text += " " + std::string(unit);
-  return text;
+  return quoted + '"';
 }
 
 const toml::node* TomlSection::find(std::string_view key) {
@@ -81,10 +86,27 @@ void TomlSection::wrong_type(std::string_view key, const toml::node& node,
   errors_->add(node, std::string(key) + " is " + toml_type_name(node) + ", expected " + expected);
 }
 
-std::vector<const toml::node*> TomlSection::elements(const toml::node& node) {
-  const toml::array* array = node.as_array();
-  if (array == nullptr) return {&node};
-  return mapped(*array, [](const toml::node& element) { return &element; });
+template <class T>
+std::optional<T> TomlSection::typed(std::string_view key, const char* expected) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  if (const auto* value = node->as<T>()) return value->get();
+  wrong_type(key, *node, expected);
+  return {};
+}
+
+template <class T, class One>
+std::optional<std::vector<T>> TomlSection::list(std::string_view key, One one) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  const toml::array* array = node->as_array();
+  std::vector<T> all;
+  for (std::size_t i = 0; i < (array == nullptr ? 1 : array->size()); ++i) {
+    std::optional<T> value = one(array == nullptr ? *node : (*array)[i]);
+    if (!value) return {};
+    all.push_back(*std::move(value));
+  }
+  return all;
 }
 
 std::optional<double> TomlSection::number_of(std::string_view key, const toml::node& node,
@@ -146,19 +168,11 @@ std::optional<std::uint64_t> TomlSection::count(std::string_view key, std::uint6
 }
 
 std::optional<bool> TomlSection::boolean(std::string_view key) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return {};
-  if (const auto* value = node->as_boolean()) return value->get();
-  wrong_type(key, *node, "true or false");
-  return {};
+  return typed<bool>(key, "true or false");
 }
 
 std::optional<std::string> TomlSection::string(std::string_view key) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return {};
-  if (const auto* value = node->as_string()) return value->get();
-  wrong_type(key, *node, "a string");
-  return {};
+  return typed<std::string>(key, "a string");
 }
 
 std::optional<std::size_t> TomlSection::choice(std::string_view key,
@@ -169,48 +183,31 @@ std::optional<std::size_t> TomlSection::choice(std::string_view key,
 }
 
 std::optional<std::vector<std::string>> TomlSection::strings(std::string_view key) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return {};
-  std::vector<std::string> all;
-  for (const toml::node* element : elements(*node)) {
-    const auto* value = element->as_string();
-    if (value == nullptr) {
-      wrong_type(key, *element, "strings");
-      return {};
-    }
-    all.push_back(value->get());
-  }
-  return all;
+  return list<std::string>(key, [&](const toml::node& element) {
+    std::optional<std::string> value = element.value_exact<std::string>();
+    if (!value) wrong_type(key, element, "strings");
+    return value;
+  });
 }
 
 std::optional<std::vector<std::size_t>> TomlSection::choices(std::string_view key,
                                                              std::span<const std::string> names) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return {};
-  std::vector<std::size_t> all;
-  for (const toml::node* element : elements(*node)) {
-    const auto value = choice_of(key, *element, names);
-    if (!value) return {};
-    if (contains(all, *value)) {
-      errors_->add(*element, std::string(key) + " names " + quoted_word(names[*value]) + " twice");
-      return {};
+  std::vector<std::size_t> seen;
+  return list<std::size_t>(key, [&](const toml::node& element) {
+    std::optional<std::size_t> value = choice_of(key, element, names);
+    if (value && contains(seen, *value)) {
+      errors_->add(element, std::string(key) + " names " + quoted_word(names[*value]) + " twice");
+      value.reset();
     }
-    all.push_back(*value);
-  }
-  return all;
+    seen.push_back(value.value_or(0));
+    return value;
+  });
 }
 
 std::optional<std::vector<double>> TomlSection::numbers(std::string_view key, double lower,
                                                         double upper, std::string_view unit) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return {};
-  std::vector<double> all;
-  for (const toml::node* element : elements(*node)) {
-    const auto value = number_of(key, *element, lower, upper, unit);
-    if (!value) return {};
-    all.push_back(*value);
-  }
-  return all;
+  return list<double>(
+      key, [&](const toml::node& element) { return number_of(key, element, lower, upper, unit); });
 }
 
 std::optional<TomlSection> TomlSection::section(std::string_view key) {

@@ -44,8 +44,8 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file);
 
 // "a string", "an array", for sentences.
 std::string toml_type_name(const toml::node& node);
-// "a number in [0, 1] s", with either end open when it is infinite.
-std::string number_range(double lower, double upper, std::string_view unit);
+// A basic string as TOML has it, quoted, on one line.
+std::string toml_string(std::string_view text);
 
 inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
@@ -116,8 +116,11 @@ class TomlSection {
                                   double upper, std::string_view unit);
   std::optional<std::size_t> choice_of(std::string_view key, const toml::node& node,
                                        std::span<const std::string> names);
-  // The elements of an array, or the node alone.
-  static std::vector<const toml::node*> elements(const toml::node& node);
+  template <class T>
+  std::optional<T> typed(std::string_view key, const char* expected);
+  // What `one` makes of every element, or of the node alone; none: of one of them nothing.
+  template <class T, class One>
+  std::optional<std::vector<T>> list(std::string_view key, One one);
 
   const toml::table* table_;
   std::string name_;

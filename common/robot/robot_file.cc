@@ -8,7 +8,6 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/config/toml_section.h"
-#include "common/config/toml_string.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 

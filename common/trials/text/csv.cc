@@ -167,17 +167,6 @@ Status check_utf8(std::string_view text, std::string_view file) {
   return {};
 }
 
-std::string range_text(double lower, double upper, const char* unit) {
-  std::string text = "a number";
-  if (upper < std::numeric_limits<double>::infinity()) {
-    text += " in [" + format_double(lower) + ", " + format_double(upper) + "]";
-  } else {
-    text += " of at least " + format_double(lower);
-  }
-  if (*unit != '\0') text += std::string(" ") + unit;
-  return text;
-}
-
 }  // namespace
 
 Error text_error(std::string_view file, TextPlace place, std::string_view found,
@@ -187,6 +176,17 @@ Error text_error(std::string_view file, TextPlace place, std::string_view found,
                         ", expected " + std::string(expected);
   if (!remedy.empty()) message += "; " + std::string(remedy);
   return {message};
+}
+
+std::string number_range(double lower, double upper, std::string_view unit) {
+  std::string text = "a number";
+  if (std::isfinite(lower) && std::isfinite(upper)) {
+    text += " in [" + format_double(lower) + ", " + format_double(upper) + "]";
+  } else if (std::isfinite(lower)) {
+    text += " of at least " + format_double(lower);
+  }
+  if (!unit.empty()) text += " " + std::string(unit);
+  return text;
 }
 
 std::string quoted_word(std::string_view word) {
@@ -358,7 +358,7 @@ double CsvRowReader::number(std::size_t column, double lower, double upper, cons
   const std::string& text = field(column).text;
   const std::optional<double> value = parse_double(text);
   if (!value) {
-    fail(column, text.empty() ? "empty" : quoted_word(text), range_text(lower, upper, unit),
+    fail(column, text.empty() ? "empty" : quoted_word(text), number_range(lower, upper, unit),
          "write decimals with a point, without units");
     return 0;
   }
@@ -368,7 +368,7 @@ double CsvRowReader::number(std::size_t column, double lower, double upper, cons
     return 0;
   }
   if (*value < lower || *value > upper) {
-    fail(column, text, range_text(lower, upper, unit), "check the column's unit");
+    fail(column, text, number_range(lower, upper, unit), "check the column's unit");
     return 0;
   }
   return *value;

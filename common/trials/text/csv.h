@@ -26,6 +26,9 @@ Error text_error(std::string_view file, TextPlace place, std::string_view found,
 // `word` in quotes, shortened, with unprintable bytes as \xNN: safe for a terminal.
 std::string quoted_word(std::string_view word);
 
+// "a number in [0, 1] s", with either end open when it is infinite.
+std::string number_range(double lower, double upper, std::string_view unit);
+
 struct CsvField {
   std::string text;  // unquoted; blanks around an unquoted field are cut off
   TextPlace place;   // of its first byte
