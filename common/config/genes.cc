@@ -83,7 +83,7 @@ void read_parameters(TomlSection& top, const ParameterTable& table, ParameterVal
   section->finish();
 }
 
-void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues& values) {
+void for_effect_rows(TomlSection& top, const ParameterTable& table, const EffectRowReader& read) {
   auto section = top.section("effects");
   if (!section) return;
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
@@ -91,14 +91,19 @@ void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues
     auto own = section->section(effect.name);
     if (!own) continue;
     for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-      const std::size_t row = table.effect_row(e) + i;
-      const toml::node* node = own->find(effect.parameters[i].key);
-      if (node == nullptr) continue;
-      values[row] = row_value(*node, table, row, own->errors()).value_or(values[row]);
+      read(*own, effect.parameters[i].key, table.effect_row(e) + i);
     }
     own->finish();
   }
   section->finish();
+}
+
+void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues& values) {
+  for_effect_rows(top, table, [&](TomlSection& own, const std::string& key, std::size_t row) {
+    if (const toml::node* node = own.find(key)) {
+      values[row] = row_value(*node, table, row, own.errors()).value_or(values[row]);
+    }
+  });
 }
 
 namespace {
@@ -123,7 +128,7 @@ class GeneReader {
       } else if (node.is_table() && begins_a_row(word)) {
         read_table(*node.as_table(), word + ".");
       } else {
-        unknown(key, word, known_names());
+        unknown(key, word, mapped(table_.rows(), &Parameter::key));
       }
     }
   }
@@ -140,11 +145,6 @@ class GeneReader {
       if (table_.effects()[e].name == name) return e;
     }
     return {};
-  }
-
-  std::vector<std::string> known_names() const {
-    std::vector<std::string> known = mapped(table_.rows(), &Parameter::key);
-    return known;
   }
 
   void unknown(const toml::key& key, const std::string& word,

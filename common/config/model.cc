@@ -62,22 +62,6 @@ void read_base(TomlSection& top, const char* name, Model& model) {
   section->finish();
 }
 
-void read_model_effects(TomlSection& top, Model& model) {
-  auto section = top.section("effects");
-  if (!section) return;
-  const ParameterTable& table = model.table();
-  for (std::size_t e = 0; e < table.effects().size(); ++e) {
-    const Effect& effect = table.effects()[e];
-    auto own = section->section(effect.name);
-    if (!own) continue;
-    for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-      read_entry(*own, effect.parameters[i].key, table.effect_row(e) + i, model);
-    }
-    own->finish();
-  }
-  section->finish();
-}
-
 void read_model_fitness(TomlSection& top, Model& model) {
   auto section = top.section("fitness");
   if (!section) return;
@@ -227,7 +211,9 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   }
   read_base(top, "parameters", model);
   read_base(top, "noise", model);
-  read_model_effects(top, model);
+  for_effect_rows(top, model.table(), [&](auto& own, const std::string& key, std::size_t row) {
+    read_entry(own, key, row, model);
+  });
   read_pieces(top, form, model.pieces, model.commands);
   if (!form.pieces) read_commands(top, model.commands);
   read_model_fitness(top, model);

@@ -73,7 +73,7 @@ void check_commands(TomlSection& section, const std::vector<CommandSpec>& comman
 
 // Two ascending numbers.
 void read_range(TomlSection& section, const char* key, double lower, double upper, const char* unit,
-                Range& to) {
+                Interval& to) {
   const auto ends = section.numbers(key, lower, upper, unit);
   if (!ends) return;
   if (ends->size() != 2 || (*ends)[0] > (*ends)[1]) {

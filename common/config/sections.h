@@ -18,6 +18,10 @@ void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettin
 // Each reads its section of `top` (when it is there) into the settings and reports what is wrong.
 void read_parameters(TomlSection& top, const ParameterTable& table, ParameterValues& values);
 void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues& values);
+// What [effects] may hold: a key in the section of its effect, and its row.
+using EffectRowReader =
+    std::function<void(TomlSection& own, const std::string& key, std::size_t row)>;
+void for_effect_rows(TomlSection& top, const ParameterTable& table, const EffectRowReader& read);
 void read_genes(TomlSection& top, const ParameterTable& table, std::vector<Gene>& genes);
 void read_commands(TomlSection& top, std::vector<CommandSpec>& commands);
 // [[pieces]], when the scenario's form has them; they become its commands.

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/interval.h"
 #include "common/problem/problem.h"
 
 namespace gapfarm {
@@ -112,11 +113,6 @@ struct FarmSettings {
 // gives them.
 enum class PlanKind { kGrid, kFree };
 
-struct Range {
-  double lower = 0;
-  double upper = 0;
-};
-
 // `gapfarm simulate`: what to drive and how often.
 struct SimulateSettings {
   PlanKind plan = PlanKind::kGrid;
@@ -130,8 +126,8 @@ struct SimulateSettings {
   std::vector<std::string> commands;   // empty: all
   double path_interval_s = 0;          // 0: no paths
   // Of a free plan, drawn evenly for each side and trial.
-  Range duty_range = {-1, 1};
-  Range duration_range_s = {0.5, 2};
+  Interval duty_range = {-1, 1};
+  Interval duration_range_s = {0.5, 2};
   double duty_step = 0;  // duties are multiples of it; 0: any
 };
 

@@ -62,7 +62,7 @@ const CommandSpec& nearest_command(const std::vector<CommandSpec>& commands, dou
 }
 
 double draw_duty(const SimulateSettings& settings, Stream& stream) {
-  const Range& range = settings.duty_range;
+  const Interval& range = settings.duty_range;
   const double duty = stream.uniform(range.lower, range.upper);
   if (settings.duty_step <= 0) return duty;
   return std::clamp(settings.duty_step * std::round(duty / settings.duty_step), -1.0, 1.0);
@@ -72,7 +72,7 @@ double draw_duty(const SimulateSettings& settings, Stream& stream) {
 void draw_drive(const std::vector<CommandSpec>& commands, const SimulateSettings& settings,
                 Stream& stream, Trial& trial) {
   if (settings.plan == PlanKind::kFree) {
-    const Range& duration = settings.duration_range_s;
+    const Interval& duration = settings.duration_range_s;
     const double left = draw_duty(settings, stream), right = draw_duty(settings, stream);
     trial.command = nearest_command(commands, left, right).name;
     trial.left = left;
