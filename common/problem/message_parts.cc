@@ -131,36 +131,27 @@ Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread)
 
 namespace {
 
-// Row by row; a last row that breaks off is omitted, which check_residual() then misses.
+using RowByRow = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// A last row that breaks off is omitted, which check_residual() then misses.
 Eigen::MatrixXd rows_of(const google::protobuf::RepeatedField<double>& numbers, int columns) {
-  Eigen::MatrixXd rows(columns > 0 ? numbers.size() / columns : 0, columns);
-  for (Eigen::Index k = 0; k < rows.rows(); ++k) {
-    for (Eigen::Index j = 0; j < rows.cols(); ++j) {
-      rows(k, j) = numbers[static_cast<int>(k) * columns + static_cast<int>(j)];
-    }
-  }
-  return rows;
+  const int rows = columns > 0 ? numbers.size() / columns : 0;
+  return Eigen::Map<const RowByRow>(numbers.data(), rows, columns);
 }
 
-void write_rows(const Eigen::MatrixXd& rows, google::protobuf::RepeatedField<double>* numbers) {
-  for (Eigen::Index k = 0; k < rows.rows(); ++k) {
-    for (Eigen::Index j = 0; j < rows.cols(); ++j) numbers->Add(rows(k, j));
-  }
+void write_rows(const RowByRow& rows, google::protobuf::RepeatedField<double>* numbers) {
+  numbers->Add(rows.data(), rows.data() + rows.size());
 }
 
 }  // namespace
 
 void write_residual(const Problem& problem, v1::Problem* message) {
-  if (const auto& outliers = problem.residual.outliers) {
+  if (auto outliers = problem.residual.outliers) {
     v1::OutlierDrives* to = message->mutable_outliers();
     to->set_kind(static_cast<std::uint32_t>(outliers->kind));
-    to->set_share(outliers->share);
-    to->set_least(outliers->least);
-    to->set_most(outliers->most);
-    to->set_rest(outliers->rest);
-    to->set_direction(outliers->direction_rad);
-    to->set_speed(outliers->speed_m_s);
-    to->set_gauge(outliers->gauge_m);
+    for (const auto& [key, value] : outlier_values(*outliers)) {
+      to->GetReflection()->SetDouble(to, to->GetDescriptor()->FindFieldByName(key), *value);
+    }
   }
   for (const ResidualTerm& term : problem.residual.field) {
     v1::ResidualTerm* to = message->add_residual();
@@ -186,14 +177,11 @@ Status read_outliers(const v1::Problem& message, Problem* problem) {
     return Error{"problem: residual.strays of kind number " + std::to_string(from.kind()) +
                  "; master and worker must be the same build"};
   }
-  const OutlierDrives outliers{static_cast<OutlierKind>(from.kind()),
-                               from.share(),
-                               from.least(),
-                               from.most(),
-                               from.rest(),
-                               from.direction(),
-                               from.speed(),
-                               from.gauge()};
+  OutlierDrives outliers;
+  outliers.kind = static_cast<OutlierKind>(from.kind());
+  for (const auto& [key, value] : outlier_values(outliers)) {
+    *value = from.GetReflection()->GetDouble(from, from.GetDescriptor()->FindFieldByName(key));
+  }
   if (Status s = check_outliers(outliers); !s) return Error{"problem: " + s.error().message};
   problem->residual.outliers = outliers;
   return {};

@@ -56,11 +56,6 @@ const ResidualWeights* weights_of(const ResidualTerm& term, const std::string& c
   return nullptr;
 }
 
-std::string plain(double value) {
-  std::string text = std::to_string(value);
-  return text;
-}
-
 // Of 1 m and of half a turn a correction is a mistake.
 constexpr double kMostShift = 1e3;
 
@@ -90,7 +85,8 @@ Status check_covariates(const ResidualTerm& term, const std::string& where) {
   }
   for (const double length : term.lengths) {
     if (!(length > 1e-9 && length < 1e9)) {
-      return Error{where + " has length " + plain(length) + "; expected one between 1e-9 and 1e9"};
+      return Error{where + " has length " + std::to_string(length) +
+                   "; expected one between 1e-9 and 1e9"};
     }
   }
   return {};

@@ -39,7 +39,7 @@ struct OutlierDrives {
   bool operator==(const OutlierDrives&) const = default;
 };
 
-// Every number of it, by the key that model.toml and diagnosis.json have for it.
+// Every number of it, by the key that model.toml, diagnosis.json and messages have for it.
 std::array<std::pair<const char*, double*>, 7> outlier_values(OutlierDrives& outliers);
 
 // Where a drive that would end at `X_WE` may end.
