@@ -94,11 +94,8 @@ Result<std::vector<std::string>> header_of(const std::string& path) {
   if (!text) return text.error();
   const auto head = parse_csv(std::string_view(*text).substr(0, text->find('\n')), path);
   if (!head) return head.error();
-  std::vector<std::string> names;
-  for (std::size_t c = 0; !head->empty() && c < head->front().fields.size(); ++c) {
-    names.push_back(head->front().fields[c].text);
-  }
-  return names;
+  if (head->empty()) return std::vector<std::string>();
+  return mapped(head->front().fields, &CsvField::text);
 }
 
 // The columns of poses: of increments with those of their noise, where the header has some.

@@ -16,12 +16,7 @@ constexpr MoveTolerance kGreatest{0.05, 0.35};
 constexpr double kScales = 5;
 constexpr double kStepsApart = 1.5;  // the square root of 2, and a margin
 
-struct Gap {
-  double distance_m = 0;
-  double heading_rad = 0;
-};
-
-Gap gap(const Trial& before, const Trial& after) {
+MoveTolerance gap(const Trial& before, const Trial& after) {
   const Pose& E = before.X_WE;
   const Pose& S = after.X_WS;
   return {std::hypot(S.x - E.x, S.y - E.y), std::abs(wrap_angle(S.theta - E.theta))};
@@ -82,7 +77,7 @@ MoveTolerance estimate_move_tolerance(const TrialLog& log) {
   std::vector<double> distances, headings;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (!before[i]) continue;
-    const Gap found = gap(log.trials[*before[i]], log.trials[i]);
+    const MoveTolerance found = gap(log.trials[*before[i]], log.trials[i]);
     distances.push_back(found.distance_m);
     headings.push_back(found.heading_rad);
   }
@@ -115,7 +110,7 @@ std::vector<TrialContext> trial_contexts(const TrialLog& log,
     const int right = sign(driven.right);
     context.last_left = left != 0 ? left : last.last_left;
     context.last_right = right != 0 ? right : last.last_right;
-    const Gap found = gap(log.trials[*before[i]], log.trials[i]);
+    const MoveTolerance found = gap(log.trials[*before[i]], log.trials[i]);
     context.moved = found.distance_m > limit.distance_m || found.heading_rad > limit.heading_rad;
     context.place_in_run = context.moved ? 0 : last.place_in_run + 1;
   }

@@ -29,10 +29,8 @@ bool has(std::string_view text, std::string_view part) { return text.find(part) 
 // Names between commas, blanks and quotes cut off.
 std::vector<std::string> names_of(std::string_view line) {
   const auto rows = parse_csv(line, "");
-  std::vector<std::string> names;
-  if (!rows.ok() || rows->empty()) return names;
-  for (const CsvField& field : rows->front().fields) names.push_back(field.text);
-  return names;
+  if (!rows.ok() || rows->empty()) return {};
+  return mapped(rows->front().fields, &CsvField::text);
 }
 
 TextFormat sniff_table(std::string_view line) {
