@@ -11,6 +11,7 @@
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "worker/fitness.h"
+#include "worker/scenarios/outcome.h"
 #include "worker/scenarios/scenario.h"
 
 namespace gapfarm {
@@ -64,14 +65,9 @@ class Prepared : public PreparedProblem {
   FitnessReference reference_;
 };
 
-v1::TaskResult failed(v1::Outcome outcome, const std::string& message) {
-  v1::TaskResult result;
-  result.set_outcome(outcome);
-  result.set_message(message);
-  return result;
+v1::TaskResult invalid(const std::string& message) {
+  return failed_task(v1::INVALID_REQUEST, message);
 }
-
-v1::TaskResult invalid(const std::string& message) { return failed(v1::INVALID_REQUEST, message); }
 
 Result<ParameterValues> values_at(const Problem& problem, const v1::Point& point) {
   const Genome genome(point.genome().begin(), point.genome().end());
@@ -102,9 +98,9 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::E
   options.steps = steps;
   options.means_only = compares_means(p.problem().fitness.kind);
   const Prediction prediction = p.predict(values, options);
-  if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
+  if (prediction.outcome != v1::OK) return failed_task(prediction.outcome, prediction.message);
   auto fitness = fitness_of(p.problem(), p.reference(), prediction);
-  if (!fitness) return failed(v1::DIVERGED, fitness.error().message);
+  if (!fitness) return failed_task(v1::DIVERGED, fitness.error().message);
   v1::TaskResult result;
   result.set_outcome(v1::OK);
   *result.mutable_evaluate() = *fitness;
@@ -135,7 +131,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   options.stream = task.stream();
   options.steps = steps;
   const Prediction prediction = p.predict(values, options);
-  if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
+  if (prediction.outcome != v1::OK) return failed_task(prediction.outcome, prediction.message);
   v1::TaskResult result;
   result.set_outcome(v1::OK);
   result.set_simulated(prediction.simulated_s);
@@ -151,7 +147,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
     write_covariance(whole.cov, to);
     const auto score = log_score_of(prediction.trials[k], density, trials[i].X_WE,
                                     p.problem().fitness.outlier_share);
-    if (!score) return failed(v1::DIVERGED, score.error().message);
+    if (!score) return failed_task(v1::DIVERGED, score.error().message);
     to->set_log_score(*score);
   }
   return result;
@@ -279,7 +275,7 @@ v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task, S
   try {
     return dispatch(static_cast<const Prepared*>(prepared), task, steps);
   } catch (const std::exception& e) {
-    return failed(v1::INVALID_REQUEST, std::string("exception: ") + e.what());
+    return invalid(std::string("exception: ") + e.what());
   }
 }
 

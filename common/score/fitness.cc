@@ -63,10 +63,17 @@ Result<double> robust_distance(const Pose& X_SE, const RealMotion& real) {
   return std::sqrt(covariance->squared_distance(difference));
 }
 
-double motion_penalty(const SimulatedMotion& motion, const FitnessSettings& settings) {
-  return settings.roll_penalty * std::abs(motion.max_roll_rad) +
-         settings.pitch_penalty * std::abs(motion.max_pitch_rad) +
-         settings.heave_penalty * std::abs(motion.max_heave_m) +
+void MotionFacts::include(const MotionFacts& others) {
+  roll_rad = std::max(roll_rad, others.roll_rad);
+  pitch_rad = std::max(pitch_rad, others.pitch_rad);
+  heave_m = std::max(heave_m, others.heave_m);
+  rest_time_s = std::max(rest_time_s, others.rest_time_s);
+}
+
+double motion_penalty(const MotionFacts& motion, const FitnessSettings& settings) {
+  return settings.roll_penalty * std::abs(motion.roll_rad) +
+         settings.pitch_penalty * std::abs(motion.pitch_rad) +
+         settings.heave_penalty * std::abs(motion.heave_m) +
          settings.rest_penalty * std::max(0.0, motion.rest_time_s - settings.rest_limit_s);
 }
 
@@ -82,7 +89,7 @@ Result<RobustFitness> robust_fitness(std::span<const RealMotion> real,
     const Result<double> distance = robust_distance(simulated[i].X_SE, real[i]);
     if (!distance) return distance.error();
     result.distance += *distance;
-    result.penalty += motion_penalty(simulated[i], settings);
+    result.penalty += motion_penalty(simulated[i].facts, settings);
   }
   result.distance /= static_cast<double>(real.size());
   result.penalty /= static_cast<double>(real.size());

@@ -55,13 +55,21 @@ struct RealMotion {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // start's axes
 };
 
+// The greatest of some simulated motions.
+struct MotionFacts {
+  double roll_rad = 0;
+  double pitch_rad = 0;
+  double heave_m = 0;
+  double rest_time_s = 0;  // from the motors' stop to rest
+
+  // Theirs and those of other motions together.
+  void include(const MotionFacts& others);
+};
+
 // The simulated mean motion of the same command.
 struct SimulatedMotion {
   Pose X_SE;
-  double max_roll_rad = 0;
-  double max_pitch_rad = 0;
-  double max_heave_m = 0;
-  double rest_time_s = 0;  // from the motors' stop to rest
+  MotionFacts facts;
 };
 
 // sqrt(d^T S^-1 d) with d = (x, y, wrapped theta) of the simulated end minus the real mean, in the
@@ -70,7 +78,7 @@ Result<double> robust_distance(const Pose& X_SE, const RealMotion& real);
 
 // roll_penalty |roll| + pitch_penalty |pitch| + heave_penalty |heave|
 //   + rest_penalty max(0, rest time - rest_limit_s).
-double motion_penalty(const SimulatedMotion& motion, const FitnessSettings& settings);
+double motion_penalty(const MotionFacts& motion, const FitnessSettings& settings);
 
 struct RobustFitness {
   double fitness = 0;   // distance + penalty; lower is better

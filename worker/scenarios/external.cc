@@ -171,14 +171,11 @@ class ExternalModel final : public ScenarioModel {
   template <class Work>
   static v1::TaskResult guarded(const Work& work) {
     if (auto refusal = refuse_to_start()) return *refusal;
-    v1::TaskResult result;
     try {
       return work();
     } catch (const ExternalFailure& failure) {
-      result.set_outcome(v1::WORKER_FAILED);
-      result.set_message(failure.what());
+      return failed_task(v1::WORKER_FAILED, failure.what());
     }
-    return result;
   }
 
   std::shared_ptr<ExternalSimulator> keeps_program_;

@@ -1,6 +1,7 @@
 #include "worker/scenarios/program.h"
 
 #include "common/process/process_pool.h"
+#include "worker/scenarios/outcome.h"
 
 namespace gapfarm {
 
@@ -21,12 +22,10 @@ std::shared_ptr<ExternalSimulator> shared_simulator(const ExternalCommand& comma
 
 std::optional<v1::TaskResult> refuse_to_start() {
   if (external_programs_allowed()) return std::nullopt;
-  v1::TaskResult refusal;
-  refusal.set_outcome(v1::INVALID_REQUEST);
-  refusal.set_message(
+  return failed_task(
+      v1::INVALID_REQUEST,
       "this worker starts no programs that a master names; start it with --allow-external, and "
       "only for a master that you trust with its machine");
-  return refusal;
 }
 
 }  // namespace gapfarm

@@ -23,8 +23,7 @@ class RacquetballModel final : public ScenarioModel {
     RacquetballSettings settings = settings_of(values);
     settings.launch_m_s *= (task.command().left() + task.command().right()) / 2;
     if (task.noisy()) {
-      Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
-                     task.stream().birth_id(), task.stream().replicate()});
+      Stream stream(stream_key(task.stream(), Purpose::kSimulation));
       for (double& x : settings.start_m) {
         x += values[row_of(Racquetball::kStartNoise)] * stream.normal();
       }

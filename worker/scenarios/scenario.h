@@ -3,12 +3,14 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
+#include "common/score/fitness.h"
 #include "common/score/scale_mixture.h"
 #include "gapfarm/v1/task.pb.h"
 #include "worker/sim/step_counter.h"
@@ -27,14 +29,6 @@ struct Alternative {
 // The predictive distribution of a trial's measured end pose: a mixture whose weights sum to 1.
 struct TrialPrediction {
   std::vector<Alternative> alternatives;
-};
-
-// The worst of a command's simulated motions.
-struct MotionFacts {
-  double roll_rad = 0;
-  double pitch_rad = 0;
-  double heave_m = 0;
-  double rest_time_s = 0;  // after the motors' stop
 };
 
 struct Prediction {
@@ -57,6 +51,15 @@ struct PredictOptions {
   std::size_t headings = 0;
   v1::StreamKey stream;          // only SpreadKind::kSampled draws from it
   StepCounter* steps = nullptr;  // counts the simulation's steps
+
+  // The trials of so many that are asked for.
+  std::vector<std::uint32_t> of(std::size_t count) const {
+    std::vector<std::uint32_t> all(trials.begin(), trials.end());
+    if (!trials.empty()) return all;
+    all.resize(count);
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+  }
 };
 
 // A scenario with a problem's trials prepared for many genomes.  Const methods are pure; `steps`

@@ -85,13 +85,8 @@ Prediction WindowModel::predict(const ParameterValues& values,
   Prediction prediction;
   prediction.facts.resize(problem_.commands.size());
   const WindowRobot robot = robot_at(values, options);
-  std::vector<std::uint32_t> wanted(options.trials.begin(), options.trials.end());
-  if (wanted.empty()) {
-    for (std::uint32_t i = 0; i < problem_.log.trials.size(); ++i) wanted.push_back(i);
-  }
   std::map<std::uint32_t, GroundMotion> motions;
-  MotionFacts& worst = prediction.facts.front();
-  for (const std::uint32_t i : wanted) {
+  for (const std::uint32_t i : options.of(problem_.log.trials.size())) {
     const Trial& trial = problem_.log.trials[i];
     const auto [entry, fresh] = motions.try_emplace(*trial.run);
     GroundMotion& motion = entry->second;
@@ -103,9 +98,8 @@ Prediction WindowModel::predict(const ParameterValues& values,
           robot.run(run.commands, {run.start_s, {ahead, 0, run.turn_rad_s}}, times_[*trial.run]);
       ++prediction.conditions;
       prediction.simulated_s += motion.simulated_s;
-      worst = {std::max(worst.roll_rad, motion.max_roll_rad),
-               std::max(worst.pitch_rad, motion.max_pitch_rad),
-               std::max(worst.heave_m, motion.max_heave_m), 0};
+      prediction.facts.front().include(
+          {motion.max_roll_rad, motion.max_pitch_rad, motion.max_heave_m, 0});
       if (motion.outcome != MotionOutcome::kOk) {
         prediction.outcome = to_outcome(motion.outcome);
         prediction.message = "run of session " + trial.session;

@@ -93,10 +93,10 @@ TEST(RobustFitness, AddsPenaltiesAsConfigured) {
                                  .rest_penalty = 5,
                                  .rest_limit_s = 1};
   const RealMotion real{"forward", {}, Eigen::Matrix3d::Identity()};
-  const SimulatedMotion calm{{3, 4, 0}, 0, 0, 0, 1};
-  const SimulatedMotion wild{{0, 0, 0}, -0.1, 0.2, 0.03, 1.5};
-  EXPECT_EQ(motion_penalty(calm, settings), 0);
-  EXPECT_NEAR(motion_penalty(wild, settings), 0.2 + 0.6 + 0.3 + 2.5, 1e-12);
+  const SimulatedMotion calm{{3, 4, 0}, {0, 0, 0, 1}};
+  const SimulatedMotion wild{{0, 0, 0}, {-0.1, 0.2, 0.03, 1.5}};
+  EXPECT_EQ(motion_penalty(calm.facts, settings), 0);
+  EXPECT_NEAR(motion_penalty(wild.facts, settings), 0.2 + 0.6 + 0.3 + 2.5, 1e-12);
   const RealMotion both[] = {real, real};
   const SimulatedMotion motions[] = {calm, wild};
   const RobustFitness fitness = robust_fitness(both, motions, settings).value();

@@ -10,6 +10,7 @@
 #include "common/random/stream.h"
 #include "common/score/fitness.h"
 #include "gapfarm/v1/task.pb.h"
+#include "worker/scenarios/outcome.h"
 #include "worker/scenarios/push/pushed_piece.h"
 #include "worker/scenarios/scenario.h"
 #include "worker/sim/step_counter.h"
@@ -58,8 +59,7 @@ class PushSession {
     Trial trial = from_proto(task_.plan(i).trial());
     if (trial.tip.size() < 2) return v1::INVALID_REQUEST;
     // A stream of its own for every trial, so that a plan's first trials do not depend on its rest.
-    Stream stream({task_.stream().run_seed(), Purpose::kSimulation, task_.stream().generation(),
-                   task_.stream().birth_id(), static_cast<std::uint64_t>(i)});
+    Stream stream(stream_key(task_.stream(), Purpose::kSimulation, static_cast<std::uint64_t>(i)));
     PushedPiece& piece = pushed(trial.command);
     const bool sampled = task_.path_interval() > 0;
     std::vector<PathSample> path;
@@ -84,9 +84,8 @@ class PushSession {
 
   Pose measured(const PushedPiece& piece, const Pose& X_WR, Stream& stream) const {
     const Pose X_WM = piece.observe(X_WR);
-    const double x = X_WM.x + noise_.pose.position_m * stream.normal();
-    const double y = X_WM.y + noise_.pose.position_m * stream.normal();
-    return {x, y, wrap_angle(X_WM.theta + noise_.pose.heading_rad * stream.normal())};
+    const Pose noise = drawn_noise(noise_.pose, stream);
+    return {X_WM.x + noise.x, X_WM.y + noise.y, wrap_angle(X_WM.theta + noise.theta)};
   }
 
   const Problem& problem_;
@@ -109,29 +108,24 @@ v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& va
 // from beside it by a reading's noise.
 v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
                           const v1::TraceTask& task, StepCounter* steps) {
-  v1::TaskResult result;
   if (task.trial() >= problem.log.trials.size()) {
-    result.set_outcome(v1::INVALID_REQUEST);
-    result.set_message("trial " + std::to_string(task.trial()) +
-                       " is to be traced, and the log has " +
-                       std::to_string(problem.log.trials.size()) + " pushes");
-    return result;
+    return failed_task(v1::INVALID_REQUEST, "trial " + std::to_string(task.trial()) +
+                                                " is to be traced, and the log has " +
+                                                std::to_string(problem.log.trials.size()) +
+                                                " pushes");
   }
   const Trial& trial = problem.log.trials[task.trial()];
   const Piece& piece = problem.piece(trial.command);
   PushedPiece pushed(piece, static_cast<std::size_t>(&piece - problem.pieces.data()), values);
   Pose X_WR = pushed.start_of(trial.X_WS);
   if (task.noisy()) {
-    const PushNoise noise = push_noise(values);
-    Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
-                   task.stream().birth_id(), task.stream().replicate()});
-    const double x = noise.pose.position_m * stream.normal();
-    const double y = noise.pose.position_m * stream.normal();
-    X_WR = X_WR * Pose{x, y, noise.pose.heading_rad * stream.normal()};
+    Stream stream(stream_key(task.stream(), Purpose::kSimulation));
+    X_WR = X_WR * drawn_noise(push_noise(values).pose, stream);
   }
   std::vector<PathSample> path;
   const PushedPiece::Push push = pushed.push(X_WR, trial.tip, &path, task.interval());
   count_step(steps);
+  v1::TaskResult result;
   result.set_outcome(push.outcome);
   result.set_simulated(pushed.simulated_s());
   for (const PathSample& s : path) {
@@ -142,18 +136,16 @@ v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
   return result;
 }
 
-using Offsets = std::vector<Eigen::Vector3d>;
+using Offsets = std::vector<Pose>;
 
-// Equally weighted deviations (x, y, heading) of the true start from the logged one: third-degree
+// Equally weighted deviations of the true start from the logged one: third-degree
 // cubature of their Gaussian (Arasaratnam and Haykin 2009, sec. III).
 Offsets cubature_offsets(const PoseNoise& noise) {
   const double reach = std::sqrt(3.0);
   Offsets offsets;
-  for (int i = 0; i < 3; ++i) {
-    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
-    offset[i] = reach * (i < 2 ? noise.position_m : noise.heading_rad);
-    offsets.push_back(offset);
-    offsets.push_back(-offset);
+  for (double Pose::*at : {&Pose::x, &Pose::y, &Pose::theta}) {
+    const double away = reach * (at == &Pose::theta ? noise.heading_rad : noise.position_m);
+    for (const double side : {away, -away}) offsets.emplace_back().*at = side;
   }
   return offsets;
 }
@@ -183,17 +175,15 @@ class PushModelOfLog : public ScenarioModel {
 
 Offsets PushModelOfLog::offsets(const PushNoise& noise, const PredictOptions& options,
                                 std::uint32_t trial) const {
-  if (options.means_only) return {Eigen::Vector3d::Zero()};
+  if (options.means_only) return {Pose()};
   if (problem_.spread.kind == SpreadKind::kCubature) return cubature_offsets(noise.pose);
   // The trial's number shares a word with the replicate's, so that trials draw independently.
-  Stream stream({options.stream.run_seed(), Purpose::kEvaluation, options.stream.generation(),
-                 options.stream.birth_id(),
-                 options.stream.replicate() | static_cast<std::uint64_t>(trial + 1) << 32});
+  Stream stream(
+      stream_key(options.stream, Purpose::kEvaluation,
+                 options.stream.replicate() | static_cast<std::uint64_t>(trial + 1) << 32));
   Offsets drawn;
   for (unsigned i = 0; i < problem_.spread.replicates; ++i) {
-    const double x = noise.pose.position_m * stream.normal();
-    const double y = noise.pose.position_m * stream.normal();
-    drawn.emplace_back(x, y, noise.pose.heading_rad * stream.normal());
+    drawn.push_back(drawn_noise(noise.pose, stream));
   }
   return drawn;
 }
@@ -222,11 +212,7 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
   // A search never comes back to a genome; a derivative moves some pieces, and not the others.
   MotionMemo<PushKey>* memo = options.means_only ? &memo_ : nullptr;
   std::map<std::size_t, PushedPiece> pieces;
-  std::vector<std::uint32_t> wanted(options.trials.begin(), options.trials.end());
-  if (wanted.empty()) {
-    for (std::uint32_t i = 0; i < problem_.log.trials.size(); ++i) wanted.push_back(i);
-  }
-  for (const std::uint32_t i : wanted) {
+  for (const std::uint32_t i : options.of(problem_.log.trials.size())) {
     const Trial& trial = problem_.log.trials[i];
     const Piece& piece = problem_.piece(trial.command);
     const auto index = static_cast<std::size_t>(&piece - problem_.pieces.data());
@@ -234,8 +220,8 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
     const Pose X_WR = pushed.start_of(trial.X_WS);
     std::vector<Pose> ends;
     double slid_m = 0;
-    for (const Eigen::Vector3d& o : offsets(noise, options, i)) {
-      const PushedPiece::Push push = pushed.push(X_WR * Pose{o[0], o[1], o[2]}, i, trial.tip, memo);
+    for (const Pose& offset : offsets(noise, options, i)) {
+      const PushedPiece::Push push = pushed.push(X_WR * offset, i, trial.tip, memo);
       count_step(options.steps);  // a push takes milliseconds: fine enough to see one that hangs
       if (push.outcome != v1::OK) {
         prediction.outcome = push.outcome;
@@ -246,10 +232,7 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
       }
       ends.push_back(pushed.observe(push.X_WE));
       slid_m += push.slid_m;
-      MotionFacts& worst = prediction.facts[index];
-      const Motion& m = push.motion;
-      worst = {std::max(worst.roll_rad, m.max_roll_rad), std::max(worst.pitch_rad, m.max_pitch_rad),
-               std::max(worst.heave_m, m.max_heave_m), std::max(worst.rest_time_s, m.rest_time_s)};
+      prediction.facts[index].include(facts_of(push.motion));
     }
     slid_m /= static_cast<double>(ends.size());
     Alternative whole = summarise(ends);

@@ -109,11 +109,7 @@ bool simulate_alone(const Srv1Robot& robot, const ConditionGroup& group, const G
 class Srv1Model : public ScenarioModel {
  public:
   explicit Srv1Model(const Problem& problem) : problem_(problem) {
-    std::vector<DrivenCommand> driven;
-    for (const Trial& trial : problem.log.trials) {
-      const CommandSpec c = resolved_command(trial, problem.commands);
-      driven.push_back({c.left, c.right, c.duration_s});
-    }
+    const std::vector<DrivenCommand> driven = driven_commands(problem.log, problem.commands);
     std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
     forget_over_moves(driven, &contexts);
     for (std::size_t i = 0; i < driven.size(); ++i) {
@@ -159,9 +155,9 @@ std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions
                                     std::size_t group) const {
   if (problem_.spread.kind != SpreadKind::kSampled) return {};
   // The group's number shares a word with the replicate's, so that groups draw independently.
-  Stream stream({options.stream.run_seed(), Purpose::kEvaluation, options.stream.generation(),
-                 options.stream.birth_id(),
-                 options.stream.replicate() | static_cast<std::uint64_t>(group + 1) << 32});
+  Stream stream(
+      stream_key(options.stream, Purpose::kEvaluation,
+                 options.stream.replicate() | static_cast<std::uint64_t>(group + 1) << 32));
   NoiseSettings core = robot.foreseen_noise();
   core.tails = {};
   std::vector<Gains> gains;
@@ -212,10 +208,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
   const unsigned context = robot.effects().motion_context();
   const Grouping& grouping = (context & kLastDirection) ? by_drive_and_last_ : by_drive_;
 
-  std::vector<std::uint32_t> wanted(options.trials.begin(), options.trials.end());
-  if (wanted.empty()) {
-    for (std::uint32_t i = 0; i < trials_.size(); ++i) wanted.push_back(i);
-  }
+  const std::vector<std::uint32_t> wanted = options.of(trials_.size());
   std::set<std::size_t> needed;
   for (std::uint32_t i : wanted) needed.insert(grouping.of_trial[i]);
 
@@ -235,10 +228,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     }
     GroupResult result = simulate_group(robot, group, options, draws(robot, options, g));
     if (result.outcome != v1::OK) return failed_group(result.outcome, grouping.groups[g]);
-    const MotionFacts& f = result.motion.facts();
-    MotionFacts& worst = prediction.facts[grouping.groups[g].command];
-    worst = {std::max(worst.roll_rad, f.roll_rad), std::max(worst.pitch_rad, f.pitch_rad),
-             std::max(worst.heave_m, f.heave_m), std::max(worst.rest_time_s, f.rest_time_s)};
+    prediction.facts[grouping.groups[g].command].include(result.motion.facts());
     motions.emplace(g, std::move(result.motion));
   }
 

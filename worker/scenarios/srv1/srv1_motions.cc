@@ -171,11 +171,7 @@ class GroupSimulation {
         robot_.run(group_.drive, situation, gains, path, path ? kPathInterval_s : 0);
     result_.outcome = to_outcome(motion.outcome);
     X_SE = motion.X_SE;
-    MotionFacts& facts = result_.motion.facts_;
-    facts.roll_rad = std::max(facts.roll_rad, motion.max_roll_rad);
-    facts.pitch_rad = std::max(facts.pitch_rad, motion.max_pitch_rad);
-    facts.heave_m = std::max(facts.heave_m, motion.max_heave_m);
-    facts.rest_time_s = std::max(facts.rest_time_s, motion.rest_time_s);
+    result_.motion.facts_.include(facts_of(motion));
     return result_.outcome == v1::OK;
   }
 

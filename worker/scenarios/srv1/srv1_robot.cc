@@ -70,8 +70,7 @@ class Session {
         task_(task),
         robot_(problem, values, steps),
         reading_(robot_.effects().reading()) {
-    Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
-                   task.stream().birth_id(), kOfTheSession});
+    Stream stream(stream_key(task.stream(), Purpose::kSimulation, kOfTheSession));
     gain_ = robot_.draw_session_gain(stream);
   }
 
@@ -98,8 +97,8 @@ class Session {
     Trial trial = from_proto(planned.trial());
     const CommandSpec command = resolved_command(trial, problem_.commands);
     // A stream of its own for every trial, so that a plan's first trials do not depend on its rest.
-    stream_ = Stream({task_.stream().run_seed(), Purpose::kSimulation, task_.stream().generation(),
-                      task_.stream().birth_id(), static_cast<std::uint64_t>(i)});
+    stream_ =
+        Stream(stream_key(task_.stream(), Purpose::kSimulation, static_cast<std::uint64_t>(i)));
     const bool moved = planned.moved() || i == 0;
     if (moved) {
       situation_.X_WR = trial.X_WS;
@@ -199,10 +198,9 @@ class Session {
     noise.position_m *= core;
     noise.heading_rad *= core;
     const Pose X_WM = robot_.effects().observe(X_WR);
-    const double x = X_WM.x + noise.position_m * stream_.normal();
-    const double y = X_WM.y + noise.position_m * stream_.normal();
-    return {rounded(x, reading_.quantum_m), rounded(y, reading_.quantum_m),
-            wrap_angle(X_WM.theta + noise.heading_rad * stream_.normal())};
+    const Pose drawn = drawn_noise(noise, stream_);
+    return {rounded(X_WM.x + drawn.x, reading_.quantum_m),
+            rounded(X_WM.y + drawn.y, reading_.quantum_m), wrap_angle(X_WM.theta + drawn.theta)};
   }
 
   const Problem& problem_;
@@ -250,14 +248,6 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
           std::clamp(1 + core * (common + right), 0.0, 2.0)};
 }
 
-std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
-                                      const ActiveEffects& effects, StepCounter* steps,
-                                      MotionMemo<MotionKey>* memo) {
-  if (problem.external) return make_external_vehicle(problem, values, steps);
-  return std::make_unique<BulletVehicle>(sim_settings(problem.treads().size(), values, effects),
-                                         steps, memo);
-}
-
 Srv1Robot::Srv1Robot(const ParameterValues& values, StepCounter* steps)
     : Srv1Robot(Problem{}, values, steps, nullptr) {}
 
@@ -265,8 +255,14 @@ Srv1Robot::Srv1Robot(const Problem& problem, const ParameterValues& values, Step
                      MotionMemo<MotionKey>* memo)
     : effects_(problem.table(), values),
       noise_(noise_of(problem, values)),
-      full_speed_m_s_(problem.external ? 1 : at(values, Srv1::kFullSpeed)),
-      vehicle_(make_vehicle(problem, values, effects_, steps, memo)) {}
+      full_speed_m_s_(problem.external ? 1 : at(values, Srv1::kFullSpeed)) {
+  if (problem.external) {
+    vehicle_ = make_external_vehicle(problem, values, steps);
+  } else {
+    vehicle_ = std::make_unique<BulletVehicle>(
+        sim_settings(problem.treads().size(), values, effects_), steps, memo);
+  }
+}
 
 NoiseSettings Srv1Robot::foreseen_noise() const {
   NoiseSettings noise = noise_;
@@ -321,8 +317,7 @@ v1::TaskResult trace_command(const Problem& problem, const ParameterValues& valu
   const v1::Command& c = task.command();
   Gains gains;
   if (task.noisy()) {
-    Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
-                   task.stream().birth_id(), task.stream().replicate()});
+    Stream stream(stream_key(task.stream(), Purpose::kSimulation));
     gains = draw_gains(robot.foreseen_noise(), stream);
   }
   const Motion motion =

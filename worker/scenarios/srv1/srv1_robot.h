@@ -40,11 +40,6 @@ class Vehicle {
                      double interval_s) = 0;
 };
 
-// The simulation of the problem's scenario at these values.  `memo` (may be null) holds motions
-// that need not be simulated again; one that is asked for with its path is.
-std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
-                                      const ActiveEffects& effects, StepCounter* steps,
-                                      MotionMemo<MotionKey>* memo);
 // Of the user's program.  One that fails throws ExternalFailure, which no ScenarioModel lets out.
 std::unique_ptr<Vehicle> make_external_vehicle(const Problem& problem,
                                                const ParameterValues& values, StepCounter* steps);
@@ -74,7 +69,9 @@ class Srv1Robot {
  public:
   // Of scenario srv1.
   explicit Srv1Robot(const ParameterValues& values, StepCounter* steps = nullptr);
-  // Of the problem's scenario: srv1, or external, whose effects are a part of srv1's.
+  // Of the problem's scenario: srv1, or external, whose effects are a part of srv1's.  `memo` (may
+  // be null) holds motions that need not be simulated again; one that is asked for with its path
+  // is.
   Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps,
             MotionMemo<MotionKey>* memo = nullptr);
 
