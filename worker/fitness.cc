@@ -22,16 +22,26 @@ Pose mean_displacement(const Problem& problem, const Prediction& prediction,
   return {sum[0], sum[1], std::atan2(sum[3], sum[2])};
 }
 
-Result<double> mean_log_score(const Problem& problem, const Prediction& prediction) {
-  const TailedDensity density(prediction.tails);
+// The mean of what `score` gives each trial, by its number.
+template <class Score>
+Result<double> mean_over(const Prediction& prediction, Score score) {
   double sum = 0;
   for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
-    ASSIGN_OR_RETURN(const auto score,
-                     log_score_of(prediction.trials[i], density, problem.log.trials[i].X_WE,
-                                  problem.fitness.outlier_share));
-    sum += score;
+    const Result<double> one = score(i);
+    if (!one) return one;
+    sum += *one;
   }
   return sum / static_cast<double>(prediction.trials.size());
+}
+
+Result<double> mean_log_score(
+    const Problem& problem, const Prediction& prediction,
+    decltype(&TailedDensity::log_density) of = &TailedDensity::log_density) {
+  const TailedDensity density(prediction.tails);
+  return mean_over(prediction, [&](std::size_t i) {
+    return log_score_of(prediction.trials[i], density, problem.log.trials[i].X_WE,
+                        problem.fitness.outlier_share, of);
+  });
 }
 
 Result<double> mean_energy_score(const Problem& problem, const Prediction& prediction) {
@@ -47,50 +57,34 @@ Result<double> mean_energy_score(const Problem& problem, const Prediction& predi
 Result<double> marginal_score(const Problem& problem, const Prediction& prediction,
                               const std::string& objective) {
   const bool position = objective == "position";
-  const TailedDensity density(prediction.tails);
-  const auto log_density =
-      position ? &TailedDensity::log_position_density : &TailedDensity::log_heading_density;
-  double sum = 0;
-  for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
-    const Pose& X_WM = problem.log.trials[i].X_WE;
-    if (problem.fitness.kind == FitnessKind::kEnergyScore) {
-      const Alternative whole = collapsed(prediction.trials[i]);
-      const Eigen::Vector3d r = local_difference(whole.X_WM, X_WM);
-      sum += position ? energy_score_of(r.head<2>(), whole.cov.topLeftCorner<2, 2>())
-                      : kHeadingLength_m *
-                            energy_score_of(r.tail<1>(), whole.cov.bottomRightCorner<1, 1>());
-      continue;
-    }
-    std::vector<double> terms;
-    for (const Alternative& a : prediction.trials[i].alternatives) {
-      if (a.weight <= 0) continue;
-      ASSIGN_OR_RETURN(const auto term,
-                       (density.*log_density)(local_difference(a.X_WM, X_WM), a.cov, a.reading_cov,
-                                              problem.fitness.outlier_share));
-      terms.push_back(std::log(a.weight) + term);
-    }
-    sum += log_sum_exp(terms);
+  if (problem.fitness.kind != FitnessKind::kEnergyScore) {
+    return mean_log_score(
+        problem, prediction,
+        position ? &TailedDensity::log_position_density : &TailedDensity::log_heading_density);
   }
-  return sum / static_cast<double>(prediction.trials.size());
+  return mean_over(prediction, [&](std::size_t i) -> Result<double> {
+    const Alternative whole = collapsed(prediction.trials[i]);
+    const Eigen::Vector3d r = local_difference(whole.X_WM, problem.log.trials[i].X_WE);
+    return position ? energy_score_of(r.head<2>(), whole.cov.topLeftCorner<2, 2>())
+                    : kHeadingLength_m *
+                          energy_score_of(r.tail<1>(), whole.cov.bottomRightCorner<1, 1>());
+  });
 }
 
-double mean_corner_distance(const Problem& problem, const Prediction& prediction) {
-  double sum = 0;
-  for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
+Result<double> mean_corner_distance(const Problem& problem, const Prediction& prediction) {
+  return mean_over(prediction, [&](std::size_t i) -> Result<double> {
     const Trial& trial = problem.log.trials[i];
-    sum += corner_distance(problem.piece(trial.command), collapsed(prediction.trials[i]).X_WM,
+    return corner_distance(problem.piece(trial.command), collapsed(prediction.trials[i]).X_WM,
                            trial.X_WE);
-  }
-  return sum / static_cast<double>(prediction.trials.size());
+  });
 }
 
 Result<RobustFitness> robust_score(const Problem& problem, const FitnessReference& reference,
                                    const Prediction& prediction) {
   std::vector<SimulatedMotion> simulated;
   for (std::size_t g = 0; g < reference.real.size(); ++g) {
-    const MotionFacts& facts = prediction.facts[reference.command[g]];
     simulated.push_back({mean_displacement(problem, prediction, reference.members[g]),
-                         facts.roll_rad, facts.pitch_rad, facts.heave_m, facts.rest_time_s});
+                         prediction.facts[reference.command[g]]});
   }
   return robust_fitness(reference.real, simulated, problem.fitness);
 }
@@ -139,12 +133,13 @@ Alternative collapsed(const TrialPrediction& prediction) {
 }
 
 Result<double> log_score_of(const TrialPrediction& prediction, const TailedDensity& density,
-                            const Pose& X_WM, double outlier_share) {
+                            const Pose& X_WM, double outlier_share,
+                            decltype(&TailedDensity::log_density) of) {
   std::vector<double> terms;
   for (const Alternative& a : prediction.alternatives) {
     if (a.weight <= 0) continue;
-    ASSIGN_OR_RETURN(const auto term, density.log_density(local_difference(a.X_WM, X_WM), a.cov,
-                                                          a.reading_cov, outlier_share));
+    ASSIGN_OR_RETURN(const auto term, (density.*of)(local_difference(a.X_WM, X_WM), a.cov,
+                                                    a.reading_cov, outlier_share));
     terms.push_back(std::log(a.weight) + term);
   }
   return log_sum_exp(terms);
@@ -167,7 +162,7 @@ Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessRefer
       break;
     }
     case FitnessKind::kCornerDistance:
-      result.set_fitness(mean_corner_distance(problem, prediction));
+      result.set_fitness(mean_corner_distance(problem, prediction).value());
       break;
     case FitnessKind::kLeastValue:
     case FitnessKind::kGreatestValue:

@@ -26,9 +26,10 @@ Result<FitnessReference> fitness_reference(const Problem& problem);
 Alternative collapsed(const TrialPrediction& prediction);
 
 // Log density (nats) of `X_WM` under the mixture; each part has the prediction's tails and its
-// share of outliers.
+// share of outliers.  `of`: the density of the pose, or of its position or heading alone.
 Result<double> log_score_of(const TrialPrediction& prediction, const TailedDensity& density,
-                            const Pose& X_WM, double outlier_share);
+                            const Pose& X_WM, double outlier_share,
+                            decltype(&TailedDensity::log_density) of = &TailedDensity::log_density);
 
 // REQUIRES: prediction.outcome is OK and holds all trials.
 Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessReference& reference,
