@@ -15,7 +15,10 @@
 namespace gapfarm {
 namespace {
 
-std::string header(const std::vector<std::string>& names) { return joined(names, ",", csv_field); }
+std::string header(std::vector<std::string> names, const std::vector<std::string>& extra = {}) {
+  names.insert(names.end(), extra.begin(), extra.end());
+  return joined(names, ",", csv_field) + "\n";
+}
 
 std::string optional_double(const std::optional<double>& value) {
   return value ? format_double(*value) : std::string();
@@ -70,18 +73,6 @@ Status check(const TrialLog& log, const std::string& path) {
   return {};
 }
 
-std::string format_pushes(const TrialLog& log) {
-  std::string text = header(push_columns());
-  for (const std::string& name : log.extra_columns) text += "," + csv_field(name);
-  text += "\n";
-  for (const Trial& trial : log.trials) {
-    text += csv_field(trial.session) + "," + std::to_string(trial.trial) + "," +
-            csv_field(trial.command) + "," + pose_fields(trial.X_WS) + "," +
-            pose_fields(trial.X_WE) + extra_fields(trial, log);
-  }
-  return text;
-}
-
 std::string beside(const std::string& path, const char* name) {
   return (std::filesystem::path(path).parent_path() / name).string();
 }
@@ -89,22 +80,23 @@ std::string beside(const std::string& path, const char* name) {
 }  // namespace
 
 std::string format_trials(const TrialLog& log) {
-  if (log.has_tips()) return format_pushes(log);
-  std::string text = header(trial_columns());
-  for (const std::string& name : log.extra_columns) text += "," + csv_field(name);
-  text += "\n";
+  const bool pushes = log.has_tips();
+  std::string text = header(pushes ? push_columns() : trial_columns(), log.extra_columns);
   for (const Trial& trial : log.trials) {
-    text += csv_field(trial.session) + "," + std::to_string(trial.trial) + "," +
-            optional_double(trial.t_s) + "," + csv_field(trial.command) + "," +
-            optional_double(trial.left) + "," + optional_double(trial.right) + "," +
-            optional_double(trial.duration_s) + "," + pose_fields(trial.X_WS) + "," +
-            pose_fields(trial.X_WE) + extra_fields(trial, log);
+    text += csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
+    if (!pushes) text += optional_double(trial.t_s) + ",";
+    text += csv_field(trial.command) + ",";
+    if (!pushes) {
+      text += optional_double(trial.left) + "," + optional_double(trial.right) + "," +
+              optional_double(trial.duration_s) + ",";
+    }
+    text += pose_fields(trial.X_WS) + "," + pose_fields(trial.X_WE) + extra_fields(trial, log);
   }
   return text;
 }
 
 std::string format_paths(const TrialLog& log) {
-  std::string text = header(path_columns()) + "\n";
+  std::string text = header(path_columns());
   for (const Trial& trial : log.trials) {
     const std::string key = csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
     for (const PathSample& sample : trial.path) {
@@ -115,7 +107,7 @@ std::string format_paths(const TrialLog& log) {
 }
 
 std::string format_tips(const TrialLog& log) {
-  std::string text = header(tip_columns()) + "\n";
+  std::string text = header(tip_columns());
   for (const Trial& trial : log.trials) {
     const std::string key = csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
     for (const TipSample& sample : trial.tip) {
