@@ -53,6 +53,12 @@ Fields parse(const std::string& text) {
   return fields;
 }
 
+// Empty where there is none.
+std::string value_of(const Fields& fields, const char* key) {
+  const auto found = fields.find(key);
+  return found == fields.end() ? "" : found->second;
+}
+
 // `forbidden`: mode bits that the file may not have.
 Result<Fields> read_fields(const std::string& path, mode_t forbidden, const char* remedy) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
@@ -103,15 +109,11 @@ Result<KeyPair> read_key_pair(const std::string& path) {
       read_fields(
           path, 077,
           "is open to other users; chmod 600 it, and make a new key if somebody may have looked"));
-  KeyPair pair;
-  if (const auto name = fields.find("name"); name != fields.end()) pair.name = name->second;
-  if (const auto text = fields.find("secret"); text != fields.end()) {
-    pair.secret_key = text->second;
-  }
+  KeyPair pair{value_of(fields, "name"), "", value_of(fields, "secret")};
   if (!is_key(pair.secret_key)) return Error{"key file '" + path + "' holds no secret key"};
   pair.public_key = public_of(pair.secret_key);
-  if (const auto text = fields.find("public");
-      text == fields.end() || text->second != pair.public_key) {
+  const std::string stated = value_of(fields, "public");
+  if (stated.empty() || stated != pair.public_key) {
     return Error{"key file '" + path + "' is damaged: its public key is not its secret key's"};
   }
   return pair;
@@ -181,9 +183,7 @@ Result<PublicKey> read_public_key(const std::string& path) {
   ASSIGN_OR_RETURN(
       const Fields fields,
       read_fields(path, 022, "can be changed by other users; chmod 644 it after a look into it"));
-  PublicKey key;
-  if (const auto name = fields.find("name"); name != fields.end()) key.name = name->second;
-  if (const auto text = fields.find("public"); text != fields.end()) key.key = text->second;
+  PublicKey key{value_of(fields, "name"), value_of(fields, "public")};
   if (!is_key(key.key)) return Error{"key file '" + path + "' holds no public key"};
   return key;
 }
