@@ -17,9 +17,7 @@ std::string expected_value(const Parameter& row) {
   if (row.kind == ParameterKind::kReal) {
     return row.unit == "-" ? "a number" : "a number in " + row.unit;
   }
-  std::string list;
-  for (const std::string& word : row.choices) list += (list.empty() ? "\"" : ", \"") + word + "\"";
-  return "one of " + list;
+  return one_of(row.choices);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -51,6 +52,10 @@ std::string toml_type_name(const toml::node& node) {
     default:
       return "a date or time";
   }
+}
+
+std::string one_of(std::span<const std::string> names) {
+  return "one of \"" + joined(names, "\", \"") + "\"";
 }
 
 std::string toml_string(std::string_view text) {
@@ -126,9 +131,7 @@ std::optional<std::size_t> TomlSection::choice_of(std::string_view key, const to
                                                   std::span<const std::string> names) {
   const auto* word = node.as_string();
   if (word == nullptr) {
-    std::string list;
-    for (const std::string& known : names) list += (list.empty() ? "\"" : ", \"") + known + "\"";
-    wrong_type(key, node, "one of " + list);
+    wrong_type(key, node, one_of(names));
     return {};
   }
   const auto found = std::find(names.begin(), names.end(), word->get());

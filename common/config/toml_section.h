@@ -44,6 +44,8 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file);
 
 // "a string", "an array", for sentences.
 std::string toml_type_name(const toml::node& node);
+// "one of "a", "b"", for sentences.
+std::string one_of(std::span<const std::string> names);
 // A basic string as TOML has it, quoted, on one line.
 std::string toml_string(std::string_view text);
 

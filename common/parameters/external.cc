@@ -74,11 +74,8 @@ bool is_key(const std::string& key) {
 }
 
 bool is_taken(const std::string& key, bool runs) {
-  for (const Parameter& row : runs ? run_rows({}) : noise_rows()) {
-    if (row.key == key) return true;
-  }
-  const std::span<const Effect> known = srv1_effects_and_seconds();
-  return contains(known, key, &Effect::name);
+  return contains(runs ? run_rows({}) : noise_rows(), key, &Parameter::key) ||
+         contains(srv1_effects_and_seconds(), key, &Effect::name);
 }
 
 template <class Wrong>

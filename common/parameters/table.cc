@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/parameters/external.h"
 #include "common/parameters/ground.h"
 #include "common/parameters/push.h"
@@ -122,21 +124,17 @@ std::string ParameterTable::format(std::size_t row, double value) const {
 }
 
 std::span<const std::string> scenario_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> all;
-    for (const ScenarioTable& row : kScenarioTables) all.emplace_back(row.scenario);
-    return all;
-  }();
+  static const auto names =
+      mapped(kScenarioTables, [](const ScenarioTable& row) { return std::string(row.scenario); });
   return names;
 }
 
 Result<const ParameterTable*> parameter_table(std::string_view scenario) {
-  std::string known;
   for (const ScenarioTable& row : kScenarioTables) {
     if (scenario == row.scenario) return &row.table();
-    known += (known.empty() ? "" : ", ") + std::string(row.scenario);
   }
-  return Error{"unknown scenario '" + std::string(scenario) + "'; known: " + known};
+  return Error{"unknown scenario '" + std::string(scenario) +
+               "'; known: " + joined(scenario_names())};
 }
 
 double decode_gene(const ParameterTable& table, const Gene& gene, double g) {
