@@ -104,8 +104,8 @@ Result<FitnessReference> fitness_reference(const Problem& problem) {
         reference.members.back().push_back(i);
       }
     }
-    const auto named = std::ranges::find(problem.commands, motion.command.name, &CommandSpec::name);
-    reference.command.push_back(static_cast<std::size_t>(named - problem.commands.begin()));
+    const CommandSpec& named = problem.command(motion.command.name);
+    reference.command.push_back(static_cast<std::size_t>(&named - problem.commands.data()));
   }
   if (reference.real.empty()) {
     return Error{"fitness robust_mahalanobis needs at least " +

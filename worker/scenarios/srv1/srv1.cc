@@ -134,9 +134,7 @@ class Srv1Model : public ScenarioModel {
 
  private:
   std::size_t command_index(const std::string& name) const {
-    std::size_t i = 0;
-    while (problem_.commands[i].name != name) ++i;
-    return i;
+    return static_cast<std::size_t>(&problem_.command(name) - problem_.commands.data());
   }
 
   std::vector<Gains> draws(const Srv1Robot& robot, const PredictOptions& options,
