@@ -205,10 +205,12 @@ class Completion {
     return {};
   }
 
+  bool places_wheels() const {
+    return std::ranges::any_of(r_.wheels, [](const RobotWheel& w) { return w.x_m && w.driven; });
+  }
+
   Status omni() {
-    const bool placed = std::any_of(r_.wheels.begin(), r_.wheels.end(),
-                                    [](const RobotWheel& w) { return w.x_m && w.driven; });
-    if (!placed) {
+    if (!places_wheels()) {
       const auto radius = r_.controller.robot_radius_m;
       if (!radius) return missing("robot_radius in m, or the wheels' x, y and heading");
       std::vector<std::string> names;
@@ -230,8 +232,7 @@ class Completion {
   }
 
   Status mecanum() {
-    const bool placed = std::any_of(r_.wheels.begin(), r_.wheels.end(),
-                                    [](const RobotWheel& w) { return w.x_m && w.driven; });
+    const bool placed = places_wheels();
     const auto& k = r_.controller;
     double lx = 0, ly = 0;
     if (!placed) {
@@ -307,15 +308,6 @@ class Completion {
     return {};
   }
 
-  // The farthest that a wheel stands out; sizes that nobody states are shares of it.
-  double reach() const {
-    double farthest = 0;
-    for (const RobotWheel& w : r_.wheels) {
-      farthest = std::max(farthest, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
-    }
-    return farthest;
-  }
-
   // Where the wheels share the load alike.  A car's or a tricycle's frame begins at its rear axle,
   // over which its mass would not stand.
   double middle(std::optional<double> RobotWheel::*at) const {
@@ -330,7 +322,8 @@ class Completion {
   }
 
   Status sizes() {
-    const double across = 2 * reach();
+    // Sizes that nobody states are shares of how far the farthest wheel stands out.
+    const double reach = wheel_reach_m(r_), across = 2 * reach;
     if (!(across > 0)) return Error{"every wheel stands at the origin; state x and y in m"};
     bool assumed = false;
     for (RobotWheel& w : r_.wheels) {
@@ -362,7 +355,7 @@ class Completion {
     }
     if (!r_.yaw_inertia_kg_m2) {
       // A plate of the wheels' circle, of even mass.
-      r_.yaw_inertia_kg_m2 = *r_.mass_kg * reach() * reach() / 2;
+      r_.yaw_inertia_kg_m2 = *r_.mass_kg * reach * reach / 2;
       assume("a yaw inertia of " + digits4(*r_.yaw_inertia_kg_m2) + " kg m^2");
     }
     return {};
