@@ -1,6 +1,7 @@
 #include "common/config/toml_section.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/base/ranges.h"
@@ -36,22 +37,11 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file) {
 }
 
 std::string toml_type_name(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a section";
-    case toml::node_type::array:
-      return "an array";
-    case toml::node_type::string:
-      return "a string";
-    case toml::node_type::integer:
-      return "an integer";
-    case toml::node_type::floating_point:
-      return "a number";
-    case toml::node_type::boolean:
-      return "a boolean";
-    default:
-      return "a date or time";
-  }
+  // By toml::node_type; what follows these are dates and times.
+  constexpr std::array kNames = {"nothing",    "a section", "an array", "a string",
+                                 "an integer", "a number",  "a boolean"};
+  const auto type = static_cast<std::size_t>(node.type());
+  return type < kNames.size() ? kNames[type] : "a date or time";
 }
 
 std::string one_of(std::span<const std::string> names) {

@@ -84,10 +84,8 @@ constexpr FormatTexts kTexts[] = {
 };
 
 const FormatTexts& texts_of(TextFormat format) {
-  for (const FormatTexts& texts : kTexts) {
-    if (texts.format == format) return texts;
-  }
-  return kTexts[std::size(kTexts) - 1];
+  const FormatTexts* texts = find_by(kTexts, format, &FormatTexts::format);
+  return texts == nullptr ? kTexts[std::size(kTexts) - 1] : *texts;
 }
 
 }  // namespace
