@@ -76,55 +76,38 @@ constexpr double kTimeSlack_s = 1e-9;  // rounding of step times
 
 }  // namespace
 
-class Simulator::Impl {
- public:
-  Impl(const SimSettings& settings, StepCounter* steps)
-      : settings_(settings), world_(settings), watched_(steps) {}
+Simulator::Simulator(const SimSettings& settings, StepCounter* steps)
+    : settings_(settings), world_(std::make_unique<RobotWorld>(settings)), watched_(steps) {}
+Simulator::~Simulator() = default;
 
-  Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
-             double interval_s);
-
-  const SimSettings& settings() const { return settings_; }
-  std::uint64_t steps() const { return steps_; }
-
- private:
-  MotionSample sample(double t_s);
-  Pose pose();
-
-  SimSettings settings_;
-  RobotWorld world_;
-  std::uint64_t steps_ = 0;
-  StepCounter* watched_;
-};
-
-Pose Simulator::Impl::pose() {
-  const btTransform& X_SB = world_.robot().body().getWorldTransform();
-  const btVector3 centre = X_SB * world_.robot().turning_centre();
+Pose Simulator::pose() {
+  const btTransform& X_SB = world_->robot().body().getWorldTransform();
+  const btVector3 centre = X_SB * world_->robot().turning_centre();
   const btVector3 ahead = X_SB.getBasis().getColumn(0);
   return {centre.x(), centre.y(), wrap_angle(std::atan2(ahead.y(), ahead.x()))};
 }
 
-MotionSample Simulator::Impl::sample(double t_s) {
-  const btTransform& X_SB = world_.robot().body().getWorldTransform();
+MotionSample Simulator::sample(double t_s) {
+  const btTransform& X_SB = world_->robot().body().getWorldTransform();
   MotionSample result;
   result.t_s = t_s;
   result.X_SB = pose();
-  result.height_m = (X_SB * world_.robot().turning_centre()).z();
+  result.height_m = (X_SB * world_->robot().turning_centre()).z();
   result.roll_rad = clamped_asin(X_SB.getBasis()[2][1]);
   result.pitch_rad = -clamped_asin(X_SB.getBasis()[2][0]);
-  result.kinetic_energy_j = world_.robot().kinetic_energy();
+  result.kinetic_energy_j = world_->robot().kinetic_energy();
   return result;
 }
 
-Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
-                            std::vector<MotionSample>* path, double interval_s) {
-  world_.reset(floor);
+Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
+                      double interval_s) {
+  world_->reset(floor);
   const SideMotion left(drive.left, drive.duration_s);
   const SideMotion right(drive.right, drive.duration_s);
   const double still_s = std::max(left.still_time(), right.still_time());
   StepPlan plan(1 / (settings_.step_rate_hz * settings_.sub_steps), left, right, drive.duration_s);
-  const btRigidBody& body = world_.robot().body();
-  const btVector3 centre = world_.robot().turning_centre();
+  const btRigidBody& body = world_->robot().body();
+  const btVector3 centre = world_->robot().turning_centre();
 
   Motion motion;
   motion.outcome = MotionOutcome::kNeverRested;
@@ -144,7 +127,7 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
     plan.advance();
     t = plan.start_s();
     const double dt = plan.length_s();
-    world_.step({left.mean_speed(t, dt), right.mean_speed(t, dt)}, dt);
+    world_->step({left.mean_speed(t, dt), right.mean_speed(t, dt)}, dt);
     ++steps_;
     count_step(watched_);
     const bool stopped = t >= still_s - kTimeSlack_s;
@@ -185,17 +168,6 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
   motion.rest_time_s = std::max(0.0, t - rest_s - drive.duration_s);
   if (path != nullptr && path->back().t_s < t) path->push_back(last);
   return motion;
-}
-
-Simulator::Simulator(const SimSettings& settings, StepCounter* steps)
-    : impl_(std::make_unique<Impl>(settings, steps)) {}
-Simulator::~Simulator() = default;
-const SimSettings& Simulator::settings() const { return impl_->settings(); }
-std::uint64_t Simulator::steps() const { return impl_->steps(); }
-
-Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
-                      double interval_s) {
-  return impl_->run(drive, floor, path, interval_s);
 }
 
 }  // namespace gapfarm

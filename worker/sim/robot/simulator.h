@@ -66,6 +66,8 @@ class StepPlan {
   double length_s_ = 0;
 };
 
+class RobotWorld;
+
 // Deterministic to the bit: run() gives the same answer as the first run() of a new simulator with
 // the same settings in a new process, whatever was run before.  One thread at a time.
 class Simulator {
@@ -76,7 +78,7 @@ class Simulator {
   ~Simulator();
   Simulator& operator=(Simulator&&) = delete;
 
-  const SimSettings& settings() const;
+  const SimSettings& settings() const { return settings_; }
 
   // Drives from rest at the origin of S until the robot rests again.  When `path` is given, it
   // receives a sample every `interval_s` from t = 0, and one at rest.
@@ -84,11 +86,16 @@ class Simulator {
              double interval_s = 0);
 
   // Steps taken and seconds spent inside Bullet's step since construction (benchmarks only).
-  std::uint64_t steps() const;
+  std::uint64_t steps() const { return steps_; }
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  MotionSample sample(double t_s);
+  Pose pose();
+
+  SimSettings settings_;
+  std::unique_ptr<RobotWorld> world_;
+  std::uint64_t steps_ = 0;
+  StepCounter* watched_;
 };
 
 }  // namespace gapfarm
