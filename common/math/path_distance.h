@@ -11,7 +11,7 @@ using PathPoint = Eigen::Vector3d;
 
 // Greatest distance between points of the same index; the shorter path waits at its last point
 // (Lettier 2013).  What it calls near depends on how both were sampled.
-// REQUIRES of all four: both paths not empty.
+// REQUIRES of all three: both paths not empty.
 double lettier_distance(std::span<const PathPoint> a, std::span<const PathPoint> b);
 
 // Greatest distance from a point of one path to the nearest of the other; order does not matter.

@@ -10,8 +10,7 @@ namespace gapfarm {
 // The sentence for an error that parsing `app`, or a subcommand of it, ended with.
 std::string usage_sentence(const CLI::App& app, const CLI::ParseError& error);
 
-// "gapfarm evolve [OPTIONS] CONFIG": what is typed for `app`, REQUIRES: its name begins with
-// `words`.
+// "gapfarm evolve [OPTIONS] CONFIG": what is typed for `app`.
 std::string synopsis(const CLI::App& app, const std::string& invocation);
 
 // A page of section 1 for man(7): name, options, every command with its own, examples.  `version`

@@ -52,7 +52,7 @@ Grouping group_trials(const std::vector<PreparedTrial>& trials, bool by_last_dir
   return grouping;
 }
 
-// An unrecorded move takes up what a side's last direction left open (backlash.cc), also for trials
+// An unrecorded move takes up what a side's last direction left open, also for trials
 // after it in which the side has not run since.
 void forget_over_moves(const std::vector<DrivenCommand>& driven,
                        std::vector<TrialContext>* contexts) {

@@ -102,7 +102,7 @@ class Session {
     const bool moved = planned.moved() || i == 0;
     if (moved) {
       situation_.X_WR = trial.X_WS;
-      situation_.last_left = situation_.last_right = 0;  // see backlash.cc
+      situation_.last_left = situation_.last_right = 0;  // see backlash in effects/drive.cc
     }
     situation_.moved = moved;
     situation_.session_time_s = trial.t_s.value_or(0);

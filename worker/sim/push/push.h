@@ -28,7 +28,7 @@ struct PushSettings {
   double shape_factor = 1;
   double stretch = 0;
   double stretch_direction_rad = 0;
-  // kDistributed instead: where on the whole face the weight is (face.h).
+  // kDistributed instead: where on the whole face the weight is.
   double pressure = 1;
   int face_points = 100;
   double com_x_m = 0;  // centre of mass from the centroid

@@ -85,7 +85,7 @@ class Simulator {
   Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path = nullptr,
              double interval_s = 0);
 
-  // Steps taken and seconds spent inside Bullet's step since construction (benchmarks only).
+  // Taken since construction (benchmarks only).
   std::uint64_t steps() const { return steps_; }
 
  private:
