@@ -1,4 +1,4 @@
-// Pushes of a piece that rests on its whole face, in the plane: see face.h and face_step.h.
+// Pushes of a piece that rests on its whole face, in the plane: see face_step.h.
 //
 // A step looks at finger and face where they are half a step later if the piece keeps its velocity,
 // so that ways converge with the square of the step.
@@ -217,6 +217,7 @@ Motion DistributedPush::follow(const FingerPath& finger_path, bool at_rest,
     ++steps;
     if (!is_sane({velocity_[0], velocity_[1], 0}, {0, 0, velocity_[2]})) {
       motion.outcome = MotionOutcome::kDiverged;
+      motion.duration_s = static_cast<double>(steps) * dt;
       return motion;
     }
     if (recorder.wanted()) recorder.add(state(t));
