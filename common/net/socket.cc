@@ -119,6 +119,18 @@ struct OwnedSocket {
 
 namespace {
 
+// What is made during its life is nobody's but its maker's.
+class PrivateFiles {
+ public:
+  PrivateFiles() = default;
+  PrivateFiles(const PrivateFiles&) = delete;
+  PrivateFiles& operator=(const PrivateFiles&) = delete;
+  ~PrivateFiles() { umask(before_); }
+
+ private:
+  const mode_t before_ = umask(0077);
+};
+
 int milliseconds(double seconds) { return static_cast<int>(std::lround(seconds * 1000)); }
 
 void configure(zmq::socket_t& socket, const SocketOptions& options) {
@@ -275,9 +287,8 @@ Result<std::string> RouterSocket::bind(const std::string& endpoint) {
   RETURN_IF_ERROR(may_listen(endpoint, security));
   try {
     secure_server(impl_->socket, security, is_tcp(endpoint) && security.open == OpenLinks::kNever);
-    const mode_t mask = umask(0077);  // nobody else may connect to a socket in the file system
+    const PrivateFiles only_ours;  // nobody else may connect to a socket in the file system
     impl_->socket.bind(endpoint);
-    umask(mask);
     return impl_->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& error) {
     const std::string remedy = error.num() == EADDRINUSE

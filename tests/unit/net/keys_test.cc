@@ -144,4 +144,15 @@ TEST(LinkSecurity, AWorkerDoesNotConnectWithoutKeysUnlessReported) {
   EXPECT_TRUE(DealerSocket::connect("tcp://127.0.0.1:1", options).ok());
 }
 
+TEST_F(Keys, ASocketThatCannotListenLeavesTheModeOfFilesToCome) {
+  const mode_t before = umask(0022);
+  SocketOptions options;
+  options.security.open = OpenLinks::kAnywhere;
+  const auto first = RouterSocket::create(options), second = RouterSocket::create(options);
+  const auto endpoint = (*first)->bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(endpoint.ok()) << endpoint.error().message;
+  EXPECT_FALSE((*second)->bind(*endpoint).ok());
+  EXPECT_EQ(umask(before), 0022u);
+}
+
 }  // namespace gapfarm::keys_test
