@@ -1,12 +1,10 @@
 #include "tests/mujoco/mujoco_engine.h"
 
-#include <mujoco/mujoco.h>
-
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <string>
+
+#include "tests/mujoco/load_model.h"
 
 namespace gapfarm::truths {
 namespace {
@@ -19,20 +17,6 @@ constexpr double kLongestRest_s = 2;
 constexpr double kGravity_m_s2 = 9.81;
 constexpr double kWheelRadius_m = 0.02, kWheelShare = 0.03;  // of the mass, each
 constexpr int kASide = 3, kWheels = 2 * kASide;              // the left ones first
-
-struct DeleteModel {
-  void operator()(mjModel* model) const { mj_deleteModel(model); }
-};
-struct DeleteData {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-
-template <class... Values>
-std::string text_of(const char* format, Values... values) {
-  char text[900];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
 
 // Wheels sink in by a millimetre, as rubber does.  Stiff ones sink in by less than sliding lifts
 // them (MuJoCo's friction pushes off what slides): such a robot hops, its turns differ by a tenth
@@ -67,27 +51,11 @@ std::string robot_xml(const Scene& scene) {
   return xml + "</body></worldbody><actuator>" + motors + "</actuator></mujoco>";
 }
 
-// MuJoCo reads models from files; this one lies in its own memory.
-mjModel* load(const std::string& xml) {
-  auto files = std::make_unique<mjVFS>();
-  mj_defaultVFS(files.get());
-  mj_makeEmptyFileVFS(files.get(), "robot.xml", static_cast<int>(xml.size()));
-  xml.copy(static_cast<char*>(files->filedata[0]), xml.size());
-  char error[500] = "";
-  mjModel* model = mj_loadXML("robot.xml", files.get(), error, sizeof error);
-  mj_deleteVFS(files.get());
-  if (model == nullptr) {
-    std::fprintf(stderr, "MuJoCo does not take the robot: %s\n", error);
-    std::abort();
-  }
-  return model;
-}
-
 class MujocoEngine : public Engine {
  public:
   explicit MujocoEngine(const Scene& scene)
       : scene_(scene),
-        model_(load(robot_xml(scene))),
+        model_(load_model(robot_xml(scene))),
         data_(mj_makeData(model_.get())),
         settled_(mj_makeData(model_.get())) {
     while (settled_->time < kSettle_s) mj_step(model_.get(), settled_.get());
@@ -143,8 +111,8 @@ class MujocoEngine : public Engine {
   }
 
   Scene scene_;
-  std::unique_ptr<mjModel, DeleteModel> model_;
-  std::unique_ptr<mjData, DeleteData> data_, settled_;  // the second: at rest on a level floor
+  ModelPointer model_;
+  DataPointer data_, settled_;  // the second: at rest on a level floor
   double rolling_radius_m_ = 0;
 };
 

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "common/trials/files.h"
 #include "tests/integration/run_program.h"
 #include "tests/mujoco/mujoco_engine.h"
 
@@ -89,6 +92,27 @@ TEST(MujocoCases, ANullsLogPassesTheCheck) {
                        folder / "out/cases/case001/trials.csv"});
   EXPECT_EQ(checked.exit_code, 0) << checked.err;
   EXPECT_THAT(checked.out + checked.err, testing::HasSubstr("48 in 3 sessions"));
+}
+
+// The diagnosis knows neither the motors nor the contacts of this robot.
+TEST(MujocoGroundRobot, ASlopeIsNamedWithTheWayDown) {
+  for (const char* kind : {"differential", "skid"}) {
+    const TemporaryFolder folder;
+    const Finished made =
+        run_program("mujoco_ground_robot", {kind, "0.06", "0.5", "7", folder / "log"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    const Finished found =
+        gapfarm_command({"diagnose", folder / "log/config.toml", "--out", folder / "out"});
+    EXPECT_EQ(found.exit_code, 0) << found.err;
+    const auto truth = read_text_file(folder / "log/truth.txt");
+    const double downhill = std::atof(truth->c_str() + truth->find("downhill") + 8);
+    const auto diagnosis = nlohmann::json::parse(*read_text_file(folder / "out/diagnosis.json"));
+    double named = NAN;
+    for (const auto& effect : diagnosis["effects"]) {
+      if (effect["name"] == "floor_tilt") named = effect["parameters"]["direction"]["value"];
+    }
+    EXPECT_NEAR(std::remainder(named - downhill, 2 * std::numbers::pi), 0, 0.15) << found.out;
+  }
 }
 
 }  // namespace
