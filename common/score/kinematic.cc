@@ -1,5 +1,6 @@
 #include "common/score/kinematic.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,6 +9,7 @@
 
 #include "common/base/constants.h"
 #include "common/robot/robot_drive.h"
+#include "common/score/measured_path.h"
 #include "common/score/omni_inverse.h"
 
 namespace gapfarm {
@@ -95,11 +97,19 @@ class Body {
 
   const GroundRobot& robot() const { return robot_; }
 
-  bool has_edge() const { return edge_ratio_ != 1; }
+  // Whether it matters where the robot is and which way it heads.
+  bool knows_place() const { return edge_ratio_ != 1 || !downhill_.isZero(); }
 
-  // `X_WR`: where the robot is on two floors; null where there is one.
+  // `X_WR`: where the robot is, if that matters.
   Twist velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive,
                  const Pose* X_WR = nullptr) const {
+    const Twist v = on_level(wheels, drive, X_WR);
+    return X_WR == nullptr ? v : v + on_slope(wheels, v, X_WR->theta);
+  }
+
+ private:
+  Twist on_level(std::span<const WheelMotion> wheels, const RobotDrive& drive,
+                 const Pose* X_WR) const {
     if (is_steered(robot_)) {
       return on_floor(ahead_ * beyond_edge(X_WR, {}) * drive.traction_m_s(), drive.curvature());
     }
@@ -134,7 +144,6 @@ class Body {
     return {(l + r) / 2, 0, (r - l) / separation_};
   }
 
- private:
   void put(const std::string& name, double value) {
     RobotThrottle& t = robot_.throttle;
     if (is_magnitude(name)) value = std::abs(value);
@@ -153,6 +162,8 @@ class Body {
     if (name == "edge_angle") edge_rad_ = value;
     if (name == "edge_offset") edge_m_ = value;
     if (name == "edge_ratio") edge_ratio_ = value;
+    if (name == "downhill_x") downhill_[0] = value;
+    if (name == "downhill_y") downhill_[1] = value;
     if (name == "separation") separation_ = value;
     if (name == "ahead") ahead_ *= value;
     if (name == "aside") aside_ *= value;
@@ -192,6 +203,25 @@ class Body {
     if (name == "marker_x") robot_.X_RM.x = value;
     if (name == "marker_y") robot_.X_RM.y = value;
     if (name == "marker_yaw") robot_.X_RM.theta = value;
+  }
+
+  // What a slope adds.  Motors run ahead of their commands downhill, in the directions that wheels
+  // roll in; what skids in a turn slides downhill too, the farther the faster it is dragged.
+  Twist on_slope(std::span<const WheelMotion> wheels, const Twist& v, double heading_rad) const {
+    const Eigen::Vector2d down = Eigen::Rotation2Dd(-heading_rad) * downhill_;
+    if (skids(robot_)) {
+      const double dragged = std::abs(v[2]) * wheel_reach_m(robot_);
+      return {dragged * down[0], dragged * down[1], 0};
+    }
+    if (is_steered(robot_)) return {std::abs(v[0]) * down[0], 0, 0};
+    double rolled = 0, driven = 0;
+    for (std::size_t i = 0; i < wheels.size(); ++i) {
+      if (!robot_.wheels[i].driven) continue;
+      rolled += std::abs(wheels[i].speed_m_s);
+      driven += 1;
+    }
+    rolled /= std::max(driven, 1.0);
+    return {rolled * down[0], is_holonomic(robot_) ? rolled * down[1] : 0, 0};
   }
 
   // What the floor makes of the travel of a wheel there.
@@ -238,32 +268,14 @@ class Body {
   Eigen::Vector2d load_;              // where the weight stands on their wheels
   double sag_ = 0, drift_ = 0, rate_ = 0, scale_ = 1, aspect_ = 1;
   double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
-  std::optional<double> grip_m_s2_;  // none: no speed slips
+  Eigen::Vector2d downhill_ = Eigen::Vector2d::Zero();  // in the tracker's frame
+  std::optional<double> grip_m_s2_;                     // none: no speed slips
   double slip_angle_rad_ = 0;
   double grip_shape_ = 2;
   std::optional<OmniWheels> omni_;
   // Of the tractions that wheels had last: they change while wheels cross an edge.
   mutable Eigen::VectorXd tractions_;
   mutable Eigen::MatrixXd inverse_;
-};
-
-// Where a run's marker was measured, straight on between.
-class MeasuredPath {
- public:
-  void add(double t_s, const Pose& X_WM) { poses_[t_s] = X_WM; }
-
-  Pose at(double t_s) const {
-    const auto after = poses_.lower_bound(t_s);
-    if (after == poses_.begin()) return after->second;
-    const auto before = std::prev(after);
-    if (after == poses_.end()) return before->second;
-    const double share = (t_s - before->first) / (after->first - before->first);
-    return before->second *
-           exp(Twist(share * gapfarm::log(between(before->second, after->second))));
-  }
-
- private:
-  std::map<double, Pose> poses_;
 };
 
 // The robot's way through one run, at the times that are asked for; where it is on two floors, by
@@ -360,12 +372,12 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
     began_s = run.commands.front().t_s;
     break;
   }
-  std::vector<MeasuredPath> measured(body.has_edge() ? runs.size() : 0);
+  std::vector<MeasuredPath> measured(body.knows_place() ? runs.size() : 0);
   for (const Trial& trial : trials) {
     const double end_s = *trial.t_s + *trial.duration_s;
     times[*trial.run].push_back(*trial.t_s);
     times[*trial.run].push_back(end_s);
-    if (!body.has_edge()) continue;
+    if (!body.knows_place()) continue;
     measured[*trial.run].add(*trial.t_s, trial.X_WS);
     measured[*trial.run].add(end_s, trial.X_WE);
   }
@@ -373,7 +385,7 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
   for (std::size_t i = 0; i < times.size(); ++i) {
     std::sort(times[i].begin(), times[i].end());
     if (times[i].empty()) continue;
-    paths[i] = path(body, runs[i], began_s, times[i], body.has_edge() ? &measured[i] : nullptr);
+    paths[i] = path(body, runs[i], began_s, times[i], body.knows_place() ? &measured[i] : nullptr);
   }
   const Pose& X_RM = body.robot().X_RM;
   std::vector<Pose> ends;

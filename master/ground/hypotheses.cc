@@ -7,6 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "master/ground/fit/edge.h"
+#include "master/ground/fit/tilt.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/put_right.h"
 #include "master/ground/tolerances.h"
@@ -43,6 +44,7 @@ class Catalogue {
   void marker();
   void tracker();
   void floors();
+  void world();
 
   std::vector<GroundHypothesis> all;
 
@@ -267,6 +269,12 @@ void Catalogue::tracker() {
       .of_world = true;
 }
 
+// Where on the floor, and which way.
+void Catalogue::world() {
+  all.push_back(floor_edge());
+  all.push_back(floor_tilt());
+}
+
 // What another floor or another load changes.
 void Catalogue::floors() {
   const KinematicRow travel{"travel", 1, kSlipShare, "ratio", "-"};
@@ -307,7 +315,7 @@ std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
   catalogue.steering();
   catalogue.motors();
   catalogue.marker();
-  catalogue.all.push_back(floor_edge());
+  catalogue.world();
   // What turns or travels on another floor has the floor's name; without a turn, omni wheels that
   // are larger cannot be distinguished from rollers that drag less.
   if (is_holonomic(robot)) {
@@ -335,7 +343,7 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
   catalogue.motors();
   catalogue.marker();
   catalogue.tracker();
-  catalogue.all.push_back(floor_edge());
+  catalogue.world();
   return std::move(catalogue.all);
 }
 

@@ -31,6 +31,8 @@ inline constexpr double kMarkerShare = 0.02;  // of the wheels' reach
 // Where the weight stands, of the wheels' reach: cables and a battery that was put back.
 inline constexpr double kLoadShare = 0.05;
 inline constexpr double kMarkerYaw_rad = 0.01;
+// How much farther wheels go downhill: free wherever it is asked for, so this is a step alone.
+inline constexpr double kDownhillShare = 0.01;
 inline constexpr double kGyroShare = 0.01;  // of a gyro's scale: data sheets of MEMS say 1 to 3 %
 inline constexpr double kSteering_rad = 0.003;
 // Tyres that slip sideways move the point that a car turns about, as if its marker stood elsewhere.

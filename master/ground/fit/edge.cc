@@ -62,21 +62,6 @@ bool parts_windows(const WindowFitter& fitter, const WindowFit& fit) {
   return std::min(share, 1 - share) > kLeastSide;
 }
 
-// 90 % of some draws; no less wide than a deviation with the folds' degrees of freedom.
-Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
-                          double deviation, const char* unit) {
-  const auto [lo, hi] = ninety_percent_of(std::move(draws));
-  const double half = kFoldTail * deviation;
-  return {key, value, std::min(lo, value - half), std::max(hi, value + half), unit};
-}
-
-// Of the mean of columns that each omit one part of the log in turn (the jackknife).
-Eigen::Vector3d jackknife_deviation(const Eigen::Matrix3Xd& parts) {
-  const auto n = static_cast<double>(parts.cols());
-  const Eigen::Vector3d mean = parts.rowwise().mean();
-  return ((parts.colwise() - mean).rowwise().squaredNorm() * (n - 1) / n).cwiseSqrt();
-}
-
 }  // namespace
 
 GroundHypothesis floor_edge() {

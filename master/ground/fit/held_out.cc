@@ -138,4 +138,17 @@ HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const 
   return with_interval(share(weighted(gained, once), weighted(gap, once)), std::move(drawn));
 }
 
+Eigen::VectorXd jackknife_deviation(const Eigen::MatrixXd& parts) {
+  const auto n = static_cast<double>(parts.cols());
+  const Eigen::VectorXd mean = parts.rowwise().mean();
+  return ((parts.colwise() - mean).rowwise().squaredNorm() * (n - 1) / n).cwiseSqrt();
+}
+
+Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
+                          double deviation, const char* unit) {
+  const auto [lo, hi] = ninety_percent_of(std::move(draws));
+  const double half = kFoldTail * deviation;
+  return {key, value, std::min(lo, value - half), std::max(hi, value + half), unit};
+}
+
 }  // namespace gapfarm

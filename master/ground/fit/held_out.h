@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/base/interval.h"
+#include "master/diagnose/result/diagnosis.h"
 #include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
@@ -27,6 +28,13 @@ std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint
 
 // What nine in ten of some draws lie within.
 Interval ninety_percent_of(std::vector<double> drawn);
+
+// Of the mean of columns that each omit one part of the log in turn (the jackknife).
+Eigen::VectorXd jackknife_deviation(const Eigen::MatrixXd& parts);
+
+// 90 % of some draws; no less wide than a deviation with the folds' degrees of freedom.
+Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
+                          double deviation, const char* unit);
 
 // Nats a window, with a 90 % interval by runs and blocks drawn again.
 struct HeldOutGain {

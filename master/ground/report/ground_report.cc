@@ -10,6 +10,7 @@
 #include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "master/ground/fit/edge.h"
+#include "master/ground/fit/tilt.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 
@@ -110,6 +111,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.text = search_.reference ? text_of_change(robot_, h, effect) + "."
                                   : text_of_value(robot_, h, effect);
   if (h.name == kFloorEdge) describe_floor_edge(fitter_, search_.fit, options_.seed, &effect);
+  if (h.name == kFloorTilt) describe_floor_tilt(fitter_, search_.fit, options_.seed, &effect);
   return effect;
 }
 
