@@ -114,11 +114,11 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
   if (requested) {
     return because(StopReason::kRequested, "stopped by request after generation ", generation);
   }
-  if (s.target_fitness && generation > 0 && optimiser.best().outcome == v1::OK &&
-      optimiser.best().cost <= cost_of_fitness(options.fitness, *s.target_fitness)) {
+  if (s.target_fitness && generation > 0 && optimiser.best().standing.outcome == v1::OK &&
+      optimiser.best().standing.cost <= cost_of_fitness(options.fitness, *s.target_fitness)) {
     return because(StopReason::kTargetFitness, "reached a ", fitness_name(options.fitness), " of ",
-                   fitness_of_cost(options.fitness, optimiser.best().cost), ", the target was ",
-                   *s.target_fitness);
+                   fitness_of_cost(options.fitness, optimiser.best().standing.cost),
+                   ", the target was ", *s.target_fitness);
   }
   if (generation >= s.generations) {
     return because(StopReason::kGenerations, "completed ", generation, " of ", s.generations,

@@ -40,10 +40,10 @@ struct GenerationRecord {
   std::uint64_t generation = 0;  // from 1
   double diversity = 0;
   std::vector<NamedNumber> operator_probabilities;
-  std::uint64_t evaluations = 0;  // since the run began
-  double wall_s = 0;              // spent on this generation
-  std::vector<Member> members;    // best first
-  std::string optimiser_state;    // after this generation
+  std::uint64_t evaluations = 0;    // since the run began
+  double wall_s = 0;                // spent on this generation
+  std::vector<Individual> members;  // best first
+  std::string optimiser_state;      // after this generation
 };
 
 // Keeps a generation; it counts as done once commit() returned.
@@ -83,8 +83,8 @@ struct EvolveSummary {
   std::string text;  // "completed 100 of 100 generations"
   std::uint64_t generations = 0;
   std::uint64_t evaluations = 0;
-  double wall_s = 0;           // with what was spent before
-  std::optional<Member> best;  // none before the first generation
+  double wall_s = 0;               // with what was spent before
+  std::optional<Individual> best;  // none before the first generation
 };
 
 // The first condition that holds now, if any, with a sentence: a request, the target fitness,

@@ -131,10 +131,14 @@ bool better(const Standing& a, const Standing& b) {
   return has_cost(a.outcome) && a.cost < b.cost;
 }
 
+bool better_individual(const Individual& a, const Individual& b) {
+  return better(a.standing, b.standing);
+}
+
 void sort_best_first(std::vector<Individual>& individuals) {
   std::sort(individuals.begin(), individuals.end(), [](const Individual& a, const Individual& b) {
-    if (better(a.standing, b.standing)) return true;
-    if (better(b.standing, a.standing)) return false;
+    if (better_individual(a, b)) return true;
+    if (better_individual(b, a)) return false;
     return a.birth_id < b.birth_id;
   });
 }
@@ -151,25 +155,6 @@ double diversity_of(const std::vector<Individual>& individuals) {
       sum += std::abs(individual.genome[gene] - mean);
   }
   return sum / (count * static_cast<double>(genes));
-}
-
-Member to_member(const Individual& individual) {
-  return {individual.birth_id,
-          individual.genome,
-          individual.standing.outcome,
-          individual.standing.cost,
-          individual.standing.scores,
-          individual.parents,
-          origin_name(individual.origin),
-          individual.standing.costs};
-}
-
-Standing standing_of(const Member& member) {
-  return {member.outcome, member.cost, 0, member.scores};
-}
-
-bool better_member(const Member& a, const Member& b) {
-  return better(standing_of(a), standing_of(b));
 }
 
 std::uint64_t SeenGenomes::key(const Genome& genome) {

@@ -1,4 +1,4 @@
-// An individual of the genetic algorithm, and which of two is the better.
+// Which of two individuals is the better, and how they are saved.
 #pragma once
 
 #include <cstdint>
@@ -33,39 +33,17 @@ enum Origin : unsigned {
 };
 std::string origin_name(unsigned origin);  // "blend+gaussian"
 
-// What is known of a genome's cost.
-struct Standing {
-  v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;  // the worst of its scores
-  double cost = 0;                                // mean over OK scores; INFEASIBLE: the greatest
-  double m2 = 0;                                  // sum of their squared deviations
-  unsigned scores = 0;
-  std::vector<double> costs = {};  // of several objectives, means as `cost`
-
-  // Takes one more score.  One with a cost that is not finite counts as DIVERGED.
-  void add(const Score& score);
-};
-
 // OK by cost, then INFEASIBLE by cost, then the other outcomes in the enum's order, unspecified
 // last. A strict weak order: no NaN gets here.
 bool better(const Standing& a, const Standing& b);
 
-struct Individual {
-  std::uint64_t birth_id = 0;
-  Genome genome;
-  Standing standing;
-  std::vector<std::uint64_t> parents;
-  unsigned origin = 0;
-};
+bool better_individual(const Individual& a, const Individual& b);  // by their standings
 
 // Best first; equal standings in order of birth, which makes the order total.
 void sort_best_first(std::vector<Individual>& individuals);
 
 // Mean distance of the genes from their mean over the individuals, in [0, 1]; 0 for none.
 double diversity_of(const std::vector<Individual>& individuals);
-
-Member to_member(const Individual& individual);
-Standing standing_of(const Member& member);  // without the spread of its scores
-bool better_member(const Member& a, const Member& b);
 
 // Genomes scored in this run, so that a duplicate costs nothing.  Keyed by 64 bits of a hash of
 // the genome's bits: with kLimit genomes two differ in less than that with a chance of 1e-11.
@@ -93,6 +71,14 @@ class SeenGenomes {
   std::vector<std::uint64_t> order_;
   std::unordered_map<std::uint64_t, Standing> standings_;
 };
+
+// Error: `state` is no message of this type.
+template <class Message>
+Result<Message> parse_state(std::string_view state) {
+  Message message;
+  if (message.ParseFromArray(state.data(), static_cast<int>(state.size()))) return message;
+  return Error{"the saved optimiser state is damaged: it cannot be decoded"};
+}
 
 // Individuals and seen genomes in a saved optimiser state.
 void save(const Individual& individual, v1::Individual& message);

@@ -47,8 +47,8 @@ unsigned island_size(const OptimiserSetup& setup) {
 
 // After a generation of one island.
 struct Look {
-  std::vector<Member> members;
-  Member best;
+  std::vector<Individual> members;
+  Individual best;
   std::uint64_t evaluations = 0;
   std::vector<NamedNumber> figures;
   std::string state;
@@ -66,6 +66,7 @@ class IslandsOptimiser final : public Optimiser, public Islands {
   IslandsOptimiser(const OptimiserSetup& setup, unsigned count)
       : whole_(population_of(setup.settings, setup.genes.size())),
         exchange_(exchange_of(setup.settings.optimiser.kind, count)),
+        space_(*setup.table, setup.genes),
         islands_(count) {}
 
   Status begin_all(const OptimiserSetup& setup) {
@@ -74,8 +75,6 @@ class IslandsOptimiser final : public Optimiser, public Islands {
     }
     return {};
   }
-
-  Status restore(const OptimiserSetup& setup, const v1::IslandsState& message);
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
@@ -93,11 +92,12 @@ class IslandsOptimiser final : public Optimiser, public Islands {
     return sum;
   }
   std::uint64_t last_improvement() const override { return last_improvement_; }
-  std::vector<Member> members() const override;
-  const Member& best() const override { return best_; }
+  std::vector<Individual> members() const override;
+  const Individual& best() const override { return best_; }
   double diversity() const override;
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string state() const override;
+  Status restore(std::string_view state) override;
 
  private:
   using Shown = std::vector<std::vector<Individual>>;  // best first, one of each island
@@ -109,10 +109,11 @@ class IslandsOptimiser final : public Optimiser, public Islands {
 
   std::uint64_t whole_;
   Exchange exchange_;
+  GeneSpace space_;
   std::vector<Island> islands_;
   std::uint64_t generation_ = 0;
   std::uint64_t last_improvement_ = 0;
-  Member best_;
+  Individual best_;
   std::map<std::uint64_t, Shown> shown_;  // by generation
   std::vector<Lot> asked_;                // by ask(), not told yet
 };
@@ -195,12 +196,10 @@ void IslandsOptimiser::show(std::size_t island, const Look& look) {
   // The best so far beside all of its generation would say something of an older distribution.
   const Optimiser& optimiser = *islands_[island].optimiser;
   const bool beside = exchange_.best == 1 && optimiser.last_improvement() < optimiser.generation();
-  for (const Member& member : look.members) {
+  for (const Individual& member : look.members) {
     if (&member == look.members.data() && beside) continue;
-    Individual& individual = its.emplace_back();
-    individual.birth_id = member.birth_id;
-    individual.genome = member.genome;
-    individual.standing = standing_of(member);
+    const Standing& s = member.standing;
+    its.push_back({member.birth_id, member.genome, {s.outcome, s.cost, 0, s.scores}, {}, 0});
   }
   sort_best_first(its);
   its.resize((its.size() + exchange_.best - 1) / exchange_.best);
@@ -221,14 +220,14 @@ bool IslandsOptimiser::advance() {
     if (island.ahead.empty()) return false;
   }
   const bool first = generation_++ == 0;
-  const Member before = best_;
+  const Individual before = best_;
   for (Island& island : islands_) {
     island.now = std::move(island.ahead.front());
     island.ahead.pop_front();
-    if (&island == islands_.data() || better_member(island.now.best, best_))
+    if (&island == islands_.data() || better_individual(island.now.best, best_))
       best_ = island.now.best;
   }
-  if (first || better_member(best_, before)) last_improvement_ = generation_;
+  if (first || better_individual(best_, before)) last_improvement_ = generation_;
   // What whoever is at this generation may still need.
   while (shown_.begin()->first + exchange_.age < generation_) shown_.erase(shown_.begin());
   return true;
@@ -253,15 +252,13 @@ void IslandsOptimiser::tell(std::span<const Score> scores) {
   advance();  // unless some score again before their generation is complete
 }
 
-std::vector<Member> IslandsOptimiser::members() const {
-  std::vector<Member> members;
+std::vector<Individual> IslandsOptimiser::members() const {
+  std::vector<Individual> members;
   for (const Island& island : islands_) {
     members.insert(members.end(), island.now.members.begin(), island.now.members.end());
   }
-  std::stable_sort(members.begin(), members.end(), better_member);
-  const auto best = std::find_if(members.begin(), members.end(), [&](const Member& member) {
-    return member.birth_id == best_.birth_id;
-  });
+  std::ranges::stable_sort(members, better_individual);
+  const auto best = std::ranges::find(members, best_.birth_id, &Individual::birth_id);
   if (best != members.end()) std::rotate(members.begin(), best, best + 1);
   return members;
 }
@@ -269,7 +266,7 @@ std::vector<Member> IslandsOptimiser::members() const {
 double IslandsOptimiser::diversity() const {
   std::vector<Individual> all;
   for (const Island& island : islands_) {
-    for (const Member& member : island.now.members) all.emplace_back().genome = member.genome;
+    all.insert(all.end(), island.now.members.begin(), island.now.members.end());
   }
   return diversity_of(all);
 }
@@ -304,7 +301,8 @@ std::string IslandsOptimiser::state() const {
   return message.SerializeAsString();
 }
 
-Status IslandsOptimiser::restore(const OptimiserSetup& setup, const v1::IslandsState& message) {
+Status IslandsOptimiser::restore(std::string_view state) {
+  ASSIGN_OR_RETURN(const auto message, parse_state<v1::IslandsState>(state));
   const int count = static_cast<int>(islands_.size());
   const Error damaged{
       "the saved state of the islands is damaged or belongs to another number of islands; resume "
@@ -313,16 +311,14 @@ Status IslandsOptimiser::restore(const OptimiserSetup& setup, const v1::IslandsS
   generation_ = message.generation();
   last_improvement_ = message.last_improvement();
   for (std::size_t i = 0; i < islands_.size(); ++i) {
-    const std::string& state = message.islands(static_cast<int>(i));
-    ASSIGN_OR_RETURN(islands_[i].optimiser, restore_optimiser(setup_of(setup, i), state));
+    RETURN_IF_ERROR(islands_[i].optimiser->restore(message.islands(static_cast<int>(i))));
     islands_[i].now = look_at(i);
     show(i, islands_[i].now);
-    if (i == 0 || better_member(islands_[i].now.best, best_)) best_ = islands_[i].now.best;
+    if (i == 0 || better_individual(islands_[i].now.best, best_)) best_ = islands_[i].now.best;
   }
-  const GeneSpace space(*setup.table, setup.genes);
   std::uint64_t generation = message.first_exchange(), last = 0;
   for (const v1::Individual& saved : message.exchanged()) {
-    ASSIGN_OR_RETURN(Individual individual, load(saved, space));
+    ASSIGN_OR_RETURN(Individual individual, load(saved, space_));
     const std::uint64_t island = individual.birth_id % islands_.size();
     if (island < last) ++generation;
     last = island;
@@ -373,18 +369,6 @@ Result<std::unique_ptr<Optimiser>> make_islands(const OptimiserSetup& setup) {
   ASSIGN_OR_RETURN(const unsigned count, island_count(setup));
   auto made = std::make_unique<IslandsOptimiser>(setup, count);
   RETURN_IF_ERROR(made->begin_all(setup));
-  return std::unique_ptr<Optimiser>(std::move(made));
-}
-
-Result<std::unique_ptr<Optimiser>> restore_islands(const OptimiserSetup& setup,
-                                                   std::string_view state) {
-  ASSIGN_OR_RETURN(const unsigned count, island_count(setup));
-  v1::IslandsState message;
-  if (!message.ParseFromArray(state.data(), static_cast<int>(state.size()))) {
-    return Error{"the saved optimiser state is damaged: it cannot be decoded"};
-  }
-  auto made = std::make_unique<IslandsOptimiser>(setup, count);
-  RETURN_IF_ERROR(made->restore(setup, message));
   return std::unique_ptr<Optimiser>(std::move(made));
 }
 

@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -47,7 +46,5 @@ Result<unsigned> island_count(const OptimiserSetup& setup);
 
 // REQUIRES: island_count() is above 1.  Errors: as make_optimiser().
 Result<std::unique_ptr<Optimiser>> make_islands(const OptimiserSetup& setup);
-Result<std::unique_ptr<Optimiser>> restore_islands(const OptimiserSetup& setup,
-                                                   std::string_view state);
 
 }  // namespace gapfarm

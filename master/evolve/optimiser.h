@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/config/settings.h"
 #include "common/parameters/table.h"
 #include "gapfarm/v1/task.pb.h"
@@ -28,16 +30,24 @@ struct Score {
   std::vector<double> costs = {};  // one each of several objectives, lower is better
 };
 
-// A member of a committed generation, for the run store and reports.
-struct Member {
+// What is known of a genome's cost.
+struct Standing {
+  v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;  // the worst of its scores
+  double cost = 0;                                // mean over OK scores; INFEASIBLE: the greatest
+  double m2 = 0;                                  // sum of their squared deviations
+  unsigned scores = 0;
+  std::vector<double> costs = {};  // of several objectives, means as `cost`
+
+  // Takes one more score.  One with a cost that is not finite counts as DIVERGED.
+  void add(const Score& score);
+};
+
+struct Individual {
   std::uint64_t birth_id = 0;
   Genome genome;
-  v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;
-  double cost = 0;  // mean over `scores`
-  unsigned scores = 0;
+  Standing standing;
   std::vector<std::uint64_t> parents;
-  std::string operators;           // "blend+gaussian", "elite", "random", "nominal"
-  std::vector<double> costs = {};  // means, of several objectives
+  unsigned origin = 0;  // bits of Origin (individual.h)
 };
 
 struct NamedNumber {
@@ -46,7 +56,6 @@ struct NamedNumber {
 };
 
 class Islands;
-struct Individual;
 
 class Optimiser {
  public:
@@ -63,11 +72,11 @@ class Optimiser {
   // Where parts of the search need not wait for one another; null: there are none.
   virtual Islands* islands() { return nullptr; }
 
-  virtual std::uint64_t generation() const = 0;        // completed generations
-  virtual std::uint64_t evaluations() const = 0;       // scores given since the start
-  virtual std::uint64_t last_improvement() const = 0;  // generation
-  virtual std::vector<Member> members() const = 0;     // best first
-  virtual const Member& best() const = 0;              // REQUIRES: generation() > 0
+  virtual std::uint64_t generation() const = 0;         // completed generations
+  virtual std::uint64_t evaluations() const = 0;        // scores given since the start
+  virtual std::uint64_t last_improvement() const = 0;   // generation
+  virtual std::vector<Individual> members() const = 0;  // best first
+  virtual const Individual& best() const = 0;           // REQUIRES: generation() > 0
   // Mean distance of the members' genes from their mean, in [0, 1].
   virtual double diversity() const = 0;
   virtual std::vector<NamedNumber> operator_probabilities() const = 0;
@@ -77,6 +86,10 @@ class Optimiser {
   // Everything ask() and tell() depend on; restoring it continues bit for bit.
   // REQUIRES: every ask() has had its tell(), and the generation is complete.
   virtual std::string state() const = 0;
+  // Goes on where the optimiser was whose state() gave `state`.  Settings may differ from its (a
+  // larger population, say), genes and operators may not.  Error: the state is damaged, or of
+  // another kind, other genes or operators.  REQUIRES: nothing was asked.
+  virtual Status restore(std::string_view state) = 0;
 };
 
 // What every optimiser is made from.

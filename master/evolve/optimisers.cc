@@ -22,15 +22,8 @@ using MakeMethod = std::unique_ptr<SearchMethod>(const MethodSetup& setup);
 
 namespace {
 
-Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup,
-                                                 MakeMethod& make_method) {
-  if (setup.genes.empty()) {
-    return Error{"there is nothing to evolve: no gene; give at least one parameter a search range"};
-  }
-  if (!setup.nominal.empty() && setup.nominal.size() != setup.genes.size()) {
-    return Error{"the nominal genome has " + std::to_string(setup.nominal.size()) +
-                 " genes instead of " + std::to_string(setup.genes.size())};
-  }
+template <MakeMethod& make_method>
+Result<std::unique_ptr<Optimiser>> make(const OptimiserSetup& setup) {
   if (!setup.spread.empty() && setup.spread.size() != setup.genes.size() * setup.genes.size()) {
     return Error{"the spread of the first genome is not one of its genes"};
   }
@@ -44,30 +37,8 @@ Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup,
                            most_evaluations(settings, setup.genes.size()),
                            setup.given};
   const auto row = static_cast<std::size_t>(settings.optimiser.kind);
-  return std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method));
-}
-
-template <MakeMethod& make_method>
-Result<std::unique_ptr<Optimiser>> make(const OptimiserSetup& setup) {
-  ASSIGN_OR_RETURN(auto made, wrapped(setup, make_method));
-  return std::unique_ptr<Optimiser>(std::move(made));
-}
-
-template <MakeMethod& make_method>
-Result<std::unique_ptr<Optimiser>> restore(const OptimiserSetup& setup, std::string_view state) {
-  ASSIGN_OR_RETURN(auto made, wrapped(setup, make_method));
-  RETURN_IF_ERROR(made->restore(state));
-  return std::unique_ptr<Optimiser>(std::move(made));
-}
-
-template <MakeMethod& make_method>
-constexpr OptimiserRow row(OptimiserKind kind, const char* name, const char* summary) {
-  return {kind, name, summary, make<make_method>, restore<make_method>};
-}
-
-const OptimiserRow& row_of(const OptimiserSetup& setup) {
-  assert(setup.table != nullptr);
-  return optimisers()[static_cast<std::size_t>(setup.settings.optimiser.kind)];
+  return std::unique_ptr<Optimiser>(
+      std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method)));
 }
 
 }  // namespace
@@ -76,10 +47,10 @@ std::span<const OptimiserRow> optimisers() {
   using Kind = OptimiserKind;
   static constexpr std::array rows = {
       OptimiserRow{Kind::kGenetic, "genetic", "genetic algorithm with self-adapted operators",
-                   make_genetic, restore_genetic},
-      OptimiserRow{Kind::kNsga2, "nsga2", "NSGA-II, the front of several objectives", make_nsga2,
-                   restore_nsga2},
-#define METHOD(name, file, Class, summary) row<make_method_##Class>(Kind::k##Class, #name, summary),
+                   make_genetic},
+      OptimiserRow{Kind::kNsga2, "nsga2", "NSGA-II, the front of several objectives", make_nsga2},
+#define METHOD(name, file, Class, summary) \
+  OptimiserRow{Kind::k##Class, #name, summary, make<make_method_##Class>},
 #include "common/config/methods.inc"
   };
   return rows;
@@ -110,14 +81,17 @@ std::uint64_t most_evaluations(const EvolutionSettings& settings, std::size_t ge
 }
 
 Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup) {
+  assert(setup.table != nullptr);
+  if (setup.genes.empty()) {
+    return Error{"there is nothing to evolve: no gene; give at least one parameter a search range"};
+  }
+  if (!setup.nominal.empty() && setup.nominal.size() != setup.genes.size()) {
+    return Error{"the nominal genome has " + std::to_string(setup.nominal.size()) +
+                 " genes instead of " + std::to_string(setup.genes.size())};
+  }
   ASSIGN_OR_RETURN(const unsigned islands, island_count(setup));
-  return islands > 1 ? make_islands(setup) : row_of(setup).make(setup);
-}
-
-Result<std::unique_ptr<Optimiser>> restore_optimiser(const OptimiserSetup& setup,
-                                                     std::string_view state) {
-  ASSIGN_OR_RETURN(const unsigned islands, island_count(setup));
-  return islands > 1 ? restore_islands(setup, state) : row_of(setup).restore(setup, state);
+  if (islands > 1) return make_islands(setup);
+  return optimisers()[static_cast<std::size_t>(setup.settings.optimiser.kind)].make(setup);
 }
 
 namespace {
@@ -170,9 +144,7 @@ Carried carried_by(std::string_view state, std::size_t genes) {
   Carried carried;
   std::vector<Individual> all;
   add_state(state, GeneSpace(std::vector<GeneKind>(genes)), &carried, &all);
-  std::stable_sort(all.begin(), all.end(), [](const Individual& a, const Individual& b) {
-    return better(a.standing, b.standing);
-  });
+  std::ranges::stable_sort(all, better_individual);
   for (Individual& individual : all) carried.population.push_back(std::move(individual.genome));
   return carried;
 }

@@ -16,10 +16,7 @@ struct OptimiserRow {
   OptimiserKind kind;
   const char* name;     // in configs
   const char* summary;  // one line
-  // As make_optimiser() and restore_optimiser().
   Result<std::unique_ptr<Optimiser>> (*make)(const OptimiserSetup& setup);
-  Result<std::unique_ptr<Optimiser>> (*restore)(const OptimiserSetup& setup,
-                                                std::string_view state);
 };
 
 // One row a kind, in the enum's order.
@@ -34,11 +31,6 @@ std::uint64_t most_evaluations(const EvolutionSettings& settings, std::size_t ge
 // The optimiser that the setup's settings name.  Errors: no genes, a nominal genome of another
 // length, and what the optimiser itself has to say (genetic.h).
 Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup);
-
-// The optimiser whose state() gave `state`, to the bit.  Errors: as above, and a state that is
-// damaged or belongs to another kind or other genes.
-Result<std::unique_ptr<Optimiser>> restore_optimiser(const OptimiserSetup& setup,
-                                                     std::string_view state);
 
 struct Carried {
   std::vector<Genome> population;  // best first; empty: of a method that has none

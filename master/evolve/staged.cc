@@ -21,7 +21,7 @@ class StagedOptimiser final : public Optimiser {
     return {};
   }
 
-  Status restore(std::string_view state) {
+  Status restore(std::string_view state) override {
     v1::StagedState message;
     const std::size_t genes = setup_.genes.size();
     if (!message.ParseFromArray(state.data(), static_cast<int>(state.size())) ||
@@ -37,15 +37,16 @@ class StagedOptimiser final : public Optimiser {
     evaluations_ = message.evaluations();
     births_ = message.births();
     last_improvement_ = message.last_improvement();
-    ASSIGN_OR_RETURN(auto restored, restore_optimiser(stage_setup(), message.optimiser()));
-    inner_ = std::move(restored);
+    RETURN_IF_ERROR(begin());
+    RETURN_IF_ERROR(inner_->restore(message.optimiser()));
     if (stage_ > 0) {
-      kept_best_.birth_id = message.best().birth_id();
-      kept_best_.outcome = static_cast<v1::Outcome>(message.best().outcome());
-      kept_best_.cost = message.best().fitness();
-      kept_best_.scores = message.best().scores();
-      kept_best_.genome = results_.back();
-      kept_best_.operators = "elite";
+      const v1::Individual& best = message.best();
+      const auto outcome = static_cast<v1::Outcome>(best.outcome());
+      kept_best_ = {best.birth_id(),
+                    results_.back(),
+                    {outcome, best.fitness(), 0, best.scores()},
+                    {},
+                    kElite};
     }
     if (generation() > 0) update_best();
     return {};
@@ -63,11 +64,11 @@ class StagedOptimiser final : public Optimiser {
   void tell(std::span<const Score> scores) override {
     const std::uint64_t was = inner_->generation();
     const bool first = generation() == 0;
-    const Member before = best_;
+    const Individual before = best_;
     inner_->tell(scores);
     if (inner_->generation() == was) return;
     update_best();
-    if (first || better_member(best_, before)) last_improvement_ = generation();
+    if (first || better_individual(best_, before)) last_improvement_ = generation();
     const bool over = inner_->evaluations() >= stages_[stage_].evaluations;
     if (stage_ + 1 < stages_.size() && over) advance();
   }
@@ -75,7 +76,7 @@ class StagedOptimiser final : public Optimiser {
   std::uint64_t generation() const override { return generations_ + inner_->generation(); }
   std::uint64_t evaluations() const override { return evaluations_ + inner_->evaluations(); }
   std::uint64_t last_improvement() const override { return last_improvement_; }
-  const Member& best() const override { return best_; }
+  const Individual& best() const override { return best_; }
   double diversity() const override { return inner_->diversity(); }
   std::string reason() const override { return inner_->reason(); }
   std::vector<NamedNumber> operator_probabilities() const override {
@@ -85,10 +86,10 @@ class StagedOptimiser final : public Optimiser {
   }
 
   // Of the generation just completed; after a stage's last one, of the stage that ended.
-  std::vector<Member> members() const override {
+  std::vector<Individual> members() const override {
     if (inner_->generation() == 0) return last_members_;
-    std::vector<Member> members;
-    for (const Member& member : inner_->members()) members.push_back(completed(member));
+    std::vector<Individual> members;
+    for (const Individual& member : inner_->members()) members.push_back(completed(member));
     if (stage_ > 0 && members.front().birth_id != best_.birth_id) {
       members.insert(members.begin(), best_);
     }
@@ -106,9 +107,9 @@ class StagedOptimiser final : public Optimiser {
     message.set_last_improvement(last_improvement_);
     v1::Individual* best = message.mutable_best();
     best->set_birth_id(kept_best_.birth_id);
-    best->set_outcome(static_cast<std::uint32_t>(kept_best_.outcome));
-    best->set_fitness(kept_best_.cost);
-    best->set_scores(kept_best_.scores);
+    best->set_outcome(static_cast<std::uint32_t>(kept_best_.standing.outcome));
+    best->set_fitness(kept_best_.standing.cost);
+    best->set_scores(kept_best_.standing.scores);
     return message.SerializeAsString();
   }
 
@@ -136,7 +137,7 @@ class StagedOptimiser final : public Optimiser {
     return genome;
   }
 
-  Member completed(Member member) const {
+  Individual completed(Individual member) const {
     member.genome = completed(member.genome);
     member.birth_id += births_;
     for (std::uint64_t& parent : member.parents) parent += births_;
@@ -148,8 +149,8 @@ class StagedOptimiser final : public Optimiser {
       best_ = kept_best_;
       return;
     }
-    const Member found = completed(inner_->best());
-    best_ = stage_ > 0 && better_member(kept_best_, found) ? kept_best_ : found;
+    const Individual found = completed(inner_->best());
+    best_ = stage_ > 0 && better_individual(kept_best_, found) ? kept_best_ : found;
   }
 
   void advance() {
@@ -158,9 +159,9 @@ class StagedOptimiser final : public Optimiser {
     evaluations_ += inner_->evaluations();
     // Births are counted by the greatest that the stage could have given: one a score and
     // duplicate.
-    for (const Member& member : last_members_) births_ = std::max(births_, member.birth_id + 1);
+    for (const Individual& member : last_members_) births_ = std::max(births_, member.birth_id + 1);
     kept_best_ = best_;
-    kept_best_.operators = "elite";
+    kept_best_.origin = kElite;
     results_.push_back(best_.genome);
     ++stage_;
     auto made = make_optimiser(stage_setup());
@@ -175,9 +176,9 @@ class StagedOptimiser final : public Optimiser {
   std::unique_ptr<Optimiser> inner_;
   std::uint64_t generations_ = 0, evaluations_ = 0, births_ = 0;  // of the completed stages
   std::uint64_t last_improvement_ = 0;
-  Member kept_best_;  // of the completed stages
-  Member best_;
-  std::vector<Member> last_members_;
+  Individual kept_best_;  // of the completed stages
+  Individual best_;
+  std::vector<Individual> last_members_;
 };
 
 Status check_stages(const OptimiserSetup& setup, const std::vector<Stage>& stages) {
@@ -206,15 +207,6 @@ Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
   RETURN_IF_ERROR(check_stages(setup, stages));
   auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
   RETURN_IF_ERROR(optimiser->begin());
-  return std::unique_ptr<Optimiser>(std::move(optimiser));
-}
-
-Result<std::unique_ptr<Optimiser>> restore_staged(const OptimiserSetup& setup,
-                                                  const std::vector<Stage>& stages,
-                                                  std::string_view state) {
-  RETURN_IF_ERROR(check_stages(setup, stages));
-  auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
-  RETURN_IF_ERROR(optimiser->restore(state));
   return std::unique_ptr<Optimiser>(std::move(optimiser));
 }
 

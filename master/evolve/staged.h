@@ -16,9 +16,6 @@ namespace gapfarm {
 // Errors: as make_optimiser(), no nominal genome.  REQUIRES: stages that read_stages() gave.
 Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
                                                const std::vector<Stage>& stages);
-Result<std::unique_ptr<Optimiser>> restore_staged(const OptimiserSetup& setup,
-                                                  const std::vector<Stage>& stages,
-                                                  std::string_view state);
 
 // The best genomes of the completed stages, in order, out of a state of `genes` genes; empty when
 // the state is not a staged optimiser's.

@@ -7,6 +7,7 @@
 #include "common/base/try.h"
 #include "common/problem/question.h"
 #include "common/progress/number_text.h"
+#include "master/evolve/individual.h"
 
 namespace gapfarm {
 namespace {
@@ -121,8 +122,8 @@ void FarmProgressWriter::on_generation(const GenerationRecord& record, std::opti
     log_->set({"generation", record.generation});
     std::vector<LogField> fields = {{"evaluations", record.evaluations}};
     if (best) fields.push_back({"best", *best});
-    if (!record.members.empty() && record.members.front().outcome == v1::INFEASIBLE) {
-      fields.push_back({"violation", record.members.front().cost});
+    if (!record.members.empty() && record.members.front().standing.outcome == v1::INFEASIBLE) {
+      fields.push_back({"violation", record.members.front().standing.cost});
     }
     log_->write(LogLevel::kInfo, "generation committed", fields);
   }
@@ -261,19 +262,21 @@ Status StoreSink::commit(const GenerationRecord& record) {
   quarantined_ = farm_.given_up();
   stored.optimiser_state = record.optimiser_state;
   const FitnessKind kind = problem_.fitness.kind;
-  for (const Member& member : record.members) {
+  for (const Individual& member : record.members) {
     StoredIndividual individual;
     individual.birth_id = member.birth_id;
     individual.genome = member.genome;
     individual.values = readable_values(problem_, member.genome);
-    individual.outcome = v1::Outcome_Name(member.outcome);
-    if (member.outcome == v1::OK) individual.fitness = fitness_of_cost(kind, member.cost);
-    individual.scores = member.scores;
+    individual.outcome = v1::Outcome_Name(member.standing.outcome);
+    if (member.standing.outcome == v1::OK)
+      individual.fitness = fitness_of_cost(kind, member.standing.cost);
+    individual.scores = member.standing.scores;
     individual.parents = member.parents;
-    individual.operators = member.operators;
-    for (std::size_t m = 0; m < member.costs.size(); ++m) {
+    individual.operators = origin_name(member.origin);
+    for (std::size_t m = 0; m < member.standing.costs.size(); ++m) {
       const auto& [name, maximise] = problem_.fitness.objectives[m];
-      individual.objectives.emplace_back(name, maximise ? -member.costs[m] : member.costs[m]);
+      individual.objectives.emplace_back(
+          name, maximise ? -member.standing.costs[m] : member.standing.costs[m]);
     }
     stored.individuals.push_back(std::move(individual));
   }

@@ -73,19 +73,17 @@ Result<std::unique_ptr<Optimiser>> optimiser_of(const RunInputs& inputs, const R
     setup.spread = start->spread;
   }
   const std::vector<Stage>& stages = inputs.plan.stages;
-  if (!inputs.checkpoint) {
-    return stages.empty() ? make_optimiser(setup) : make_staged(setup, stages);
-  }
-  const std::string& state = inputs.checkpoint->optimiser_state;
-  return stages.empty() ? restore_optimiser(setup, state) : restore_staged(setup, stages, state);
+  ASSIGN_OR_RETURN(auto made, stages.empty() ? make_optimiser(setup) : make_staged(setup, stages));
+  if (inputs.checkpoint) RETURN_IF_ERROR(made->restore(inputs.checkpoint->optimiser_state));
+  return made;
 }
 
 // What a run without a best to leave has to say.
 std::string without_best(const EvolveSummary& evolved) {
-  if (!evolved.best || evolved.best->outcome == v1::OK) return {};
-  if (evolved.best->outcome != v1::INFEASIBLE) return "; no evaluation ended well";
+  if (!evolved.best || evolved.best->standing.outcome == v1::OK) return {};
+  if (evolved.best->standing.outcome != v1::INFEASIBLE) return "; no evaluation ended well";
   return fmt::format("; nothing feasible was found, violations sum to {:.6g} at least",
-                     evolved.best->cost);
+                     evolved.best->standing.cost);
 }
 
 Status write_end(RunStore& store, Progress progress, RunState state, const std::string& reason) {
@@ -172,7 +170,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   const RunState state = summary.stopped() ? RunState::kStopped : RunState::kFinished;
   RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));
   if (summary.stopped()) return summary;
-  if (summary.evolved.best && summary.evolved.best->outcome == v1::OK) {
+  if (summary.evolved.best && summary.evolved.best->standing.outcome == v1::OK) {
     const Status left = leave_model(store, request, *inputs, **farm, watcher, summary);
     // Finished is what has its model; resumed, it only leaves that behind.
     if (!left) return stopped_by(store, left.error(), progress.now());

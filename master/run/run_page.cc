@@ -152,7 +152,7 @@ Result<std::optional<RunOutcome>> stored_outcome(const RunReader& reader, std::u
 Model model_of(const RunStore& store, const Problem& problem, const Config& config,
                const EvolveSummary& summary) {
   Model model = model_of_problem(problem, problem.values_of(summary.best->genome));
-  model.score = fitness_of_cost(problem.fitness.kind, summary.best->cost);
+  model.score = fitness_of_cost(problem.fitness.kind, summary.best->standing.cost);
   model.data = {store.info().problem_hash, problem.log.trials.size(), config.trial_files};
   model.origin = {store.run().string(), config.seed, summary.generations, summary.evaluations};
   return model;

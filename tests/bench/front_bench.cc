@@ -52,7 +52,8 @@ double our_share(const FrontFunction& function, unsigned generations, unsigned s
   };
   run.until(std::uint64_t{generations} * kPopulation);
   std::vector<Costs> points;
-  for (const Member& member : run.optimiser().members()) points.push_back(member.costs);
+  for (const Individual& member : run.optimiser().members())
+    points.push_back(member.standing.costs);
   return share_of(function, points);
 }
 

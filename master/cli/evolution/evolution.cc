@@ -109,8 +109,8 @@ void show(const RunSummary& summary, const RunStore& store, const Problem& probl
       {"evaluations", evolved.evaluations}, {"wall_s", evolved.wall_s},
       {"fitness", fitness_name(kind)},      {"best_fitness", nullptr}};
   std::string text = evolved.text;
-  if (evolved.best && evolved.best->outcome == v1::OK) {
-    const double best = fitness_of_cost(kind, evolved.best->cost);
+  if (evolved.best && evolved.best->standing.outcome == v1::OK) {
+    const double best = fitness_of_cost(kind, evolved.best->standing.cost);
     text += fmt::format("; best {} {:.6g}", fitness_name(kind), best);
     json["best_fitness"] = best;
   }
@@ -195,7 +195,7 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   }
   if (summary->given_up == 0) {
     const auto& best = summary->evolved.best;
-    if (!best || best->outcome == v1::OK) return kExitDone;
+    if (!best || best->standing.outcome == v1::OK) return kExitDone;
     const std::string why = summary->failure.empty() ? "" : ": " + summary->failure;
     context.console.note("there is no model" + why + "; what happened: gapfarm status " +
                          shell_quoted(run));

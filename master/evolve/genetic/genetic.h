@@ -9,21 +9,13 @@
 #pragma once
 
 #include <memory>
-#include <string_view>
 
 #include "common/base/result.h"
 #include "master/evolve/optimiser.h"
 
 namespace gapfarm {
 
-// Errors: no genes, a population below 2 or not above the elites, no operators, a probability
-// outside [0, 1], a nominal genome of another length.
+// Errors: a population below 2 or not above the elites, no operators, a probability outside [0, 1].
 Result<std::unique_ptr<Optimiser>> make_genetic(const OptimiserSetup& setup);
-
-// The optimiser whose state() gave `state`.  Settings may differ from the run's (a larger
-// population, say), genes and operators may not.  Errors: as above, and a state that is damaged or
-// belongs to other genes or operators.
-Result<std::unique_ptr<Optimiser>> restore_genetic(const OptimiserSetup& setup,
-                                                   std::string_view state);
 
 }  // namespace gapfarm

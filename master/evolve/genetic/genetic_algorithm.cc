@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "common/base/try.h"
-#include "master/evolve/genetic/genetic_algorithm.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {
@@ -15,11 +14,7 @@ namespace {
 bool is_probability(double p) { return p >= 0 && p <= 1; }
 
 Status check(const OptimiserSetup& setup) {
-  assert(setup.table != nullptr);
   const EvolutionSettings& s = setup.settings;
-  if (setup.genes.empty()) {
-    return Error{"there is nothing to evolve: no gene; give at least one parameter a search range"};
-  }
   if (s.population < 2 || s.elitism >= s.population) {
     return Error{"a population of " + std::to_string(s.population) + " with " +
                  std::to_string(s.elitism) +
@@ -33,10 +28,6 @@ Status check(const OptimiserSetup& setup) {
     if (!is_probability(p)) {
       return Error{"an operator probability of " + std::to_string(p) + " is outside [0, 1]"};
     }
-  }
-  if (!setup.nominal.empty() && setup.nominal.size() != setup.genes.size()) {
-    return Error{"the nominal genome has " + std::to_string(setup.nominal.size()) +
-                 " genes instead of " + std::to_string(setup.genes.size())};
   }
   return {};
 }
@@ -62,7 +53,8 @@ std::string GeneticAlgorithm::state() const {
   return message.SerializeAsString();
 }
 
-Status GeneticAlgorithm::restore(const v1::GeneticState& message) {
+Status GeneticAlgorithm::restore(std::string_view state) {
+  ASSIGN_OR_RETURN(const auto message, parse_state<v1::GeneticState>(state));
   if (const Status status = load_seen(message, seen_); !status) return status.error();
   if (message.generation() > 0 && (message.population_size() == 0 || message.hall_size() == 0)) {
     return Error{"the saved optimiser state is damaged: it has no population"};
@@ -80,7 +72,6 @@ Status GeneticAlgorithm::restore(const v1::GeneticState& message) {
   if (message.generation() > 0) {
     ASSIGN_OR_RETURN(Individual best, load(message.hall(0), breeder_.space()));
     best_ = std::move(best);
-    best_member_ = to_member(best_);
   }
   generation_ = message.generation();
   next_birth_id_ = message.next_birth_id();
@@ -94,18 +85,6 @@ Status GeneticAlgorithm::restore(const v1::GeneticState& message) {
 Result<std::unique_ptr<Optimiser>> make_genetic(const OptimiserSetup& setup) {
   if (const Status status = check(setup); !status) return status.error();
   return std::unique_ptr<Optimiser>(std::make_unique<GeneticAlgorithm>(setup));
-}
-
-Result<std::unique_ptr<Optimiser>> restore_genetic(const OptimiserSetup& setup,
-                                                   std::string_view state) {
-  if (const Status status = check(setup); !status) return status.error();
-  v1::GeneticState message;
-  if (!message.ParseFromArray(state.data(), static_cast<int>(state.size()))) {
-    return Error{"the saved optimiser state is damaged: it cannot be decoded"};
-  }
-  auto optimiser = std::make_unique<GeneticAlgorithm>(setup);
-  if (const Status status = optimiser->restore(message); !status) return status.error();
-  return std::unique_ptr<Optimiser>(std::move(optimiser));
 }
 
 GeneticAlgorithm::GeneticAlgorithm(const OptimiserSetup& setup)
@@ -326,29 +305,13 @@ void GeneticAlgorithm::update_best() {
     if (preferred(individual, best_)) best_ = individual;
   }
   if (first || better(best_.standing, before)) last_improvement_ = generation_;
-  best_member_ = to_member(best_);
 }
 
-std::vector<Member> GeneticAlgorithm::members() const {
-  std::vector<Member> members;
-  for (const Individual& individual : population_) {
-    if (individual.birth_id == best_.birth_id)
-      members.insert(members.begin(), to_member(individual));
-    else
-      members.push_back(to_member(individual));
-  }
+std::vector<Individual> GeneticAlgorithm::members() const {
+  std::vector<Individual> members = population_;
+  std::ranges::stable_partition(
+      members, [&](const Individual& member) { return member.birth_id == best_.birth_id; });
   return members;
-}
-
-const Member& GeneticAlgorithm::best() const {
-  assert(generation_ > 0);
-  return best_member_;
-}
-
-double GeneticAlgorithm::diversity() const { return diversity_of(population_); }
-
-std::vector<NamedNumber> GeneticAlgorithm::operator_probabilities() const {
-  return breeder_.probabilities();
 }
 
 }  // namespace gapfarm

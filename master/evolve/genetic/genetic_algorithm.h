@@ -20,14 +20,14 @@ class GeneticAlgorithm final : public Optimiser {
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
   std::uint64_t last_improvement() const override { return last_improvement_; }
-  std::vector<Member> members() const override;
-  const Member& best() const override;
-  double diversity() const override;
-  std::vector<NamedNumber> operator_probabilities() const override;
+  std::vector<Individual> members() const override;
+  const Individual& best() const override { return best_; }
+  double diversity() const override { return diversity_of(population_); }
+  std::vector<NamedNumber> operator_probabilities() const override {
+    return breeder_.probabilities();
+  }
   std::string state() const override;
-
-  // Takes over a saved state.  Errors: it does not fit the genes or operators.
-  Status restore(const v1::GeneticState& state);
+  Status restore(std::string_view state) override;
 
  private:
   struct Newborn {
@@ -74,7 +74,6 @@ class GeneticAlgorithm final : public Optimiser {
   std::uint64_t restarts_ = 0;
   std::vector<Individual> population_;  // best first
   Individual best_;
-  Member best_member_;
   SeenGenomes seen_;
   std::vector<Individual> others_;  // parents of the next generation, beside the population
   std::optional<Plan> plan_;        // asked for, without scores yet

@@ -77,12 +77,12 @@ class Nsga2 final : public Optimiser {
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
   std::uint64_t last_improvement() const override { return last_improvement_; }
-  std::vector<Member> members() const override;
-  const Member& best() const override { return best_; }
+  std::vector<Individual> members() const override;
+  const Individual& best() const override { return best_; }
   double diversity() const override { return diversity_of(population_); }
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string state() const override;
-  Status restore(std::string_view state);
+  Status restore(std::string_view state) override;
 
  private:
   struct Plan {
@@ -111,7 +111,7 @@ class Nsga2 final : public Optimiser {
   std::vector<Individual> population_;  // best first
   std::size_t front_size_ = 0;          // of them, where it ended well
   Costs reference_;                     // empty: nothing ended well yet
-  Member best_;
+  Individual best_;
   std::optional<Plan> plan_;
 };
 
@@ -265,7 +265,7 @@ std::vector<Costs> Nsga2::front() const {
 
 void Nsga2::note_best() {
   const std::vector<Costs> best = front();
-  best_ = to_member(population_[best.empty() ? 0 : knee_of(best)]);
+  best_ = population_[best.empty() ? 0 : knee_of(best)];
   if (!reference_.empty() || best.empty()) return;
   std::vector<Costs> ended_well;
   for (const Individual& member : population_) {
@@ -274,11 +274,11 @@ void Nsga2::note_best() {
   reference_ = greatest_of(ended_well);
 }
 
-std::vector<Member> Nsga2::members() const {
-  std::vector<Member> members;
+std::vector<Individual> Nsga2::members() const {
+  std::vector<Individual> members;
   if (generation_ > 0) members.push_back(best_);
   for (const Individual& individual : population_) {
-    if (individual.birth_id != best_.birth_id) members.push_back(to_member(individual));
+    if (individual.birth_id != best_.birth_id) members.push_back(individual);
   }
   return members;
 }
@@ -303,10 +303,7 @@ std::string Nsga2::state() const {
 }
 
 Status Nsga2::restore(std::string_view state) {
-  v1::GeneticState message;
-  if (!message.ParseFromArray(state.data(), static_cast<int>(state.size()))) {
-    return Error{"the saved optimiser state is damaged: it cannot be decoded"};
-  }
+  ASSIGN_OR_RETURN(const auto message, parse_state<v1::GeneticState>(state));
   if (message.generation() > 0 && message.population_size() == 0) {
     return Error{"the saved optimiser state is damaged: it has no population"};
   }
@@ -336,29 +333,10 @@ Status Nsga2::restore(std::string_view state) {
   return {};
 }
 
-Result<std::unique_ptr<Nsga2>> checked(const OptimiserSetup& setup) {
-  if (setup.genes.empty()) {
-    return Error{"there is nothing to evolve: no gene; give at least one parameter a search range"};
-  }
-  if (!setup.nominal.empty() && setup.nominal.size() != setup.genes.size()) {
-    return Error{"the nominal genome has " + std::to_string(setup.nominal.size()) +
-                 " genes instead of " + std::to_string(setup.genes.size())};
-  }
-  return std::make_unique<Nsga2>(setup);
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Optimiser>> make_nsga2(const OptimiserSetup& setup) {
-  ASSIGN_OR_RETURN(auto made, checked(setup));
-  return std::unique_ptr<Optimiser>(std::move(made));
-}
-
-Result<std::unique_ptr<Optimiser>> restore_nsga2(const OptimiserSetup& setup,
-                                                 std::string_view state) {
-  ASSIGN_OR_RETURN(auto made, checked(setup));
-  RETURN_IF_ERROR(made->restore(state));
-  return std::unique_ptr<Optimiser>(std::move(made));
+  return std::unique_ptr<Optimiser>(std::make_unique<Nsga2>(setup));
 }
 
 }  // namespace gapfarm

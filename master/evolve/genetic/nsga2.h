@@ -14,19 +14,12 @@
 #pragma once
 
 #include <memory>
-#include <string_view>
 
 #include "common/base/result.h"
 #include "master/evolve/optimiser.h"
 
 namespace gapfarm {
 
-// Errors: no genes, a nominal genome of another length.
 Result<std::unique_ptr<Optimiser>> make_nsga2(const OptimiserSetup& setup);
-
-// The optimiser whose state() gave `state`.  Errors: as above, and a state that is damaged or
-// belongs to other genes.
-Result<std::unique_ptr<Optimiser>> restore_nsga2(const OptimiserSetup& setup,
-                                                 std::string_view state);
 
 }  // namespace gapfarm

@@ -175,9 +175,7 @@ bool DifferentialEvolution::converged() const {
 }
 
 const Individual& DifferentialEvolution::best() const {
-  return *std::min_element(
-      population_.begin(), population_.end(),
-      [](const Individual& a, const Individual& b) { return better(a.standing, b.standing); });
+  return *std::ranges::min_element(population_, better_individual);
 }
 
 void DifferentialEvolution::save(v1::MethodState& message) const {

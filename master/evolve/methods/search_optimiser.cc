@@ -228,7 +228,7 @@ void SearchOptimiser::tell(std::span<const Score> scores) {
   if (proposed_ < method_->generation_size()) return;
   ++generation_;
   proposed_ = 0;
-  best_member_ = to_member(best_);
+  complete_best_ = best_;
 }
 
 bool SearchOptimiser::preferred(const Standing& a, const Standing& b) const {
@@ -262,18 +262,13 @@ std::string SearchOptimiser::reason() const {
          "may be noise, up to " + std::to_string(full_scores()) + " times (elite_replicates)";
 }
 
-std::vector<Member> SearchOptimiser::members() const {
-  std::vector<Member> members;
-  if (generation_ > 0) members.push_back(best_member_);
+std::vector<Individual> SearchOptimiser::members() const {
+  std::vector<Individual> members;
+  if (generation_ > 0) members.push_back(complete_best_);
   for (const Individual& individual : round_) {
-    if (individual.birth_id != best_.birth_id) members.push_back(to_member(individual));
+    if (individual.birth_id != best_.birth_id) members.push_back(individual);
   }
   return members;
-}
-
-const Member& SearchOptimiser::best() const {
-  assert(generation_ > 0);
-  return best_member_;
 }
 
 std::string SearchOptimiser::state() const {
@@ -293,10 +288,7 @@ std::string SearchOptimiser::state() const {
 }
 
 Status SearchOptimiser::restore(std::string_view state) {
-  v1::SearchState message;
-  if (!message.ParseFromArray(state.data(), static_cast<int>(state.size()))) {
-    return Error{"the saved optimiser state is damaged: it cannot be decoded"};
-  }
+  ASSIGN_OR_RETURN(const auto message, parse_state<v1::SearchState>(state));
   if (message.kind() != kind_) {
     return Error{"the saved optimiser state is one of \"" + message.kind() +
                  "\", but the config asks for \"" + kind_ +
@@ -319,7 +311,7 @@ Status SearchOptimiser::restore(std::string_view state) {
   if (ledger.generation() > 0) {
     ASSIGN_OR_RETURN(Individual best, load(ledger.hall(0), space_));
     best_ = std::move(best);
-    best_member_ = to_member(best_);
+    complete_best_ = best_;
   }
   generation_ = ledger.generation();
   next_birth_id_ = ledger.next_birth_id();

@@ -35,15 +35,13 @@ class SearchOptimiser final : public Optimiser {
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
   std::uint64_t last_improvement() const override { return last_improvement_; }
-  std::vector<Member> members() const override;  // the generation's proposals and the best
-  const Member& best() const override;
+  std::vector<Individual> members() const override;  // the generation's proposals and the best
+  const Individual& best() const override { return complete_best_; }
   double diversity() const override { return diversity_of(round_); }
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string reason() const override;
   std::string state() const override;
-
-  // Errors: a state of another kind or of other genes, or damaged.
-  Status restore(std::string_view state);
+  Status restore(std::string_view state) override;
 
  private:
   enum class Whose { kTitle, kProposal, kIncumbent };
@@ -92,7 +90,7 @@ class SearchOptimiser final : public Optimiser {
   std::vector<Individual> round_;  // the last generation's or this one's so far, best first
   std::size_t proposed_ = 0;       // of a generation that is not complete
   Individual best_;
-  Member best_member_;
+  Individual complete_best_;  // of the generations that are complete
   SeenGenomes seen_;
   Genome migrant_;            // of the next generation; empty: none
   std::optional<Plan> plan_;  // asked for, without scores yet

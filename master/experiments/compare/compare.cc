@@ -55,9 +55,9 @@ class Lane {
     optimiser_->tell(scores);
     run.evaluations += scores.size();
     // Under noise a single good score is luck: the optimiser says which is the best.
-    const Member& best = optimiser_->best();
-    if (noisy_ && best.outcome == v1::OK) {
-      const double fitness = fitness_of_cost(kind_, best.cost);
+    const Individual& best = optimiser_->best();
+    if (noisy_ && best.standing.outcome == v1::OK) {
+      const double fitness = fitness_of_cost(kind_, best.standing.cost);
       if (run.improvements.empty() || run.improvements.back().fitness != fitness) {
         add(run.evaluations, fitness);
       }

@@ -312,11 +312,12 @@ Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& set
   options.settings = settings.evolution;
   options.fitness = problem.fitness.kind;
   ASSIGN_OR_RETURN(const auto summary, evolve(*optimiser, backend, sink, clock, options));
-  if (!summary.best || summary.best->outcome != v1::OK) {
+  if (!summary.best || summary.best->standing.outcome != v1::OK) {
     return Error{"every genome failed; widen or move the genes' ranges"};
   }
   return Tuned{problem.values_of(summary.best->genome),
-               fitness_of_cost(problem.fitness.kind, summary.best->cost), summary.evaluations};
+               fitness_of_cost(problem.fitness.kind, summary.best->standing.cost),
+               summary.evaluations};
 }
 
 Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,

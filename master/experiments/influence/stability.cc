@@ -100,11 +100,11 @@ Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
     idle = genomes.empty() ? idle + 1 : 0;
   }
   report.evaluations = optimiser->evaluations();
-  const Member& best = optimiser->best();
-  if (best.outcome != v1::OK) {
+  const Individual& best = optimiser->best();
+  if (best.standing.outcome != v1::OK) {
     return Error{"no point of the searched box ends well; narrow the genes' ranges"};
   }
-  report.best = {problem.values_of(best.genome), best.cost};
+  report.best = {problem.values_of(best.genome), best.standing.cost};
   ASSIGN_OR_RETURN(const auto fresh, search.spreads({{}, best.genome}, kFreshNoise));
   report.standard_fresh = fresh[0];
   report.best_fresh = fresh[1];

@@ -77,8 +77,8 @@ TEST(Compare, RunsAreThoseOfEvolve) {
       for (const Candidate& c : alone->ask()) requests.push_back({run.variant, run.seed, c});
       alone->tell(sphere_scores(requests).value());
     }
-    EXPECT_LE(alone->best().cost, run.improvements.back().fitness);
-    EXPECT_NEAR(alone->best().cost, run.improvements.back().fitness, 1e-2);
+    EXPECT_LE(alone->best().standing.cost, run.improvements.back().fitness);
+    EXPECT_NEAR(alone->best().standing.cost, run.improvements.back().fitness, 1e-2);
   }
 }
 

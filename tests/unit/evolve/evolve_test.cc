@@ -81,7 +81,7 @@ TEST_F(EvolveTest, StopsAfterItsGenerations) {
   EXPECT_EQ(summary.generations, 12U);
   EXPECT_EQ(sink_.records.size(), 12U);
   EXPECT_EQ(summary.wall_s, 24);
-  EXPECT_EQ(summary.best->cost, run_.optimiser().best().cost);
+  EXPECT_EQ(summary.best->standing.cost, run_.optimiser().best().standing.cost);
 }
 
 TEST_F(EvolveTest, StopsAtItsEvaluations) {
@@ -105,7 +105,7 @@ TEST_F(EvolveTest, StopsAtItsTargetInTheFitnesssOwnSense) {
   options_.settings.generations = 1000;
   EvolveSummary summary = go().value();
   EXPECT_EQ(summary.reason, StopReason::kTargetFitness);
-  EXPECT_LE(summary.best->cost, 0.5);
+  EXPECT_LE(summary.best->standing.cost, 0.5);
   EXPECT_THAT(summary.text, testing::HasSubstr("the target was 0.5"));
 
   // For a log score of -cost the same target is -0.5.
@@ -158,7 +158,7 @@ TEST_F(EvolveTest, ResumingFromAnyGenerationGivesTheSameDigests) {
   ASSERT_TRUE(go());
   const std::vector<GenerationRecord> records = sink_.records;
   for (const GenerationRecord& from : records) {
-    auto optimiser = restore_genetic(run_.setup(), from.optimiser_state).value();
+    auto optimiser = restore_optimiser(run_.setup(), from.optimiser_state).value();
     KeepingSink rest;
     ASSERT_TRUE(evolve(*optimiser, backend_, rest, clock_, options_));
     EXPECT_EQ(

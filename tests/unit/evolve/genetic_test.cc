@@ -33,9 +33,9 @@ int solved(const Toy& toy, const EvolutionSettings& settings, std::uint64_t eval
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     ToyRun run(toy, settings, seed);
     run.until(evaluations);
-    count += run.optimiser().best().cost < target;
-    if (run.optimiser().best().cost >= target) {
-      std::cout << "seed " << seed << ": " << run.optimiser().best().cost << "\n";
+    count += run.optimiser().best().standing.cost < target;
+    if (run.optimiser().best().standing.cost >= target) {
+      std::cout << "seed " << seed << ": " << run.optimiser().best().standing.cost << "\n";
     }
   }
   return count;
@@ -70,9 +70,9 @@ TEST(Genetic, ElitismNeverLosesTheBest) {
   double best = HUGE_VAL;
   for (int i = 0; i < 60; ++i) {
     run.generation();
-    EXPECT_LE(run.optimiser().best().cost, best);
-    best = run.optimiser().best().cost;
-    EXPECT_EQ(run.optimiser().members().front().cost, best);
+    EXPECT_LE(run.optimiser().best().standing.cost, best);
+    best = run.optimiser().best().standing.cost;
+    EXPECT_EQ(run.optimiser().members().front().standing.cost, best);
     EXPECT_EQ(run.optimiser().members().size(), 12U);
   }
 }
@@ -84,8 +84,8 @@ TEST(Genetic, WithoutElitesTheBestIsStillRemembered) {
   double best = HUGE_VAL;
   for (int i = 0; i < 40; ++i) {
     run.generation();
-    EXPECT_LE(run.optimiser().best().cost, best);
-    best = run.optimiser().best().cost;
+    EXPECT_LE(run.optimiser().best().standing.cost, best);
+    best = run.optimiser().best().standing.cost;
   }
 }
 
@@ -97,7 +97,7 @@ TEST(Genetic, TheNominalGenomeIsBornFirst) {
   setup.table = &table;
   setup.genes = toy.genes();
   setup.nominal.assign(8, 0.3);
-  const auto optimiser = make_genetic(setup).value();
+  const auto optimiser = make_optimiser(setup).value();
   const std::vector<Candidate> first = optimiser->ask();
   EXPECT_EQ(first.size(), 10U);
   EXPECT_EQ(first[0].birth_id, 0U);
@@ -114,11 +114,11 @@ TEST(Genetic, SetupErrorsReportWhatIsWrong) {
   good.settings = settings_with(10);
   good.table = &table;
   good.genes = toy.genes();
-  EXPECT_TRUE(make_genetic(good).ok());
+  EXPECT_TRUE(make_optimiser(good).ok());
   const auto message = [&](auto change) {
     OptimiserSetup setup = good;
     change(setup);
-    const auto made = make_genetic(setup);
+    const auto made = make_optimiser(setup);
     return made.ok() ? std::string("none") : made.error().message;
   };
   using testing::HasSubstr;
@@ -206,13 +206,13 @@ TEST(SaveAndRestore, DamagedOrForeignStatesAreRefused) {
   ToyRun run(sphere(3), settings_with(10), 1);
   run.generation();
   const std::string state = run.optimiser().state();
-  EXPECT_FALSE(restore_genetic(run.setup(), state.substr(0, state.size() / 2)).ok());
+  EXPECT_FALSE(restore_optimiser(run.setup(), state.substr(0, state.size() / 2)).ok());
   OptimiserSetup other = run.setup();
   other.genes.pop_back();
-  EXPECT_THAT(restore_genetic(other, state).error().message, testing::HasSubstr("3 genes"));
+  EXPECT_THAT(restore_optimiser(other, state).error().message, testing::HasSubstr("3 genes"));
   other = run.setup();
   other.settings.crossovers = {CrossoverKind::kOnePoint};
-  EXPECT_THAT(restore_genetic(other, state).error().message, testing::HasSubstr("operators"));
+  EXPECT_THAT(restore_optimiser(other, state).error().message, testing::HasSubstr("operators"));
 }
 
 TEST(Determinism, SeedsDecideEverything) {
@@ -234,12 +234,12 @@ TEST(Duplicates, AreNeverAskedTwice) {
     for (const Candidate& candidate : run.generation()) {
       EXPECT_TRUE(asked.insert(candidate.genome).second) << "generation " << i;
     }
-    for (const Member& member : run.optimiser().members()) {
-      EXPECT_EQ(member.cost, toy.cost(run.values(member.genome)));
+    for (const Individual& member : run.optimiser().members()) {
+      EXPECT_EQ(member.standing.cost, toy.cost(run.values(member.genome)));
     }
   }
   EXPECT_LE(asked.size(), 81U);
-  EXPECT_EQ(run.optimiser().best().cost, 0);
+  EXPECT_EQ(run.optimiser().best().standing.cost, 0);
 }
 
 TEST(Restart, ComesAfterStagnationAndKeepsTheElites) {
@@ -251,13 +251,13 @@ TEST(Restart, ComesAfterStagnationAndKeepsTheElites) {
   std::vector<std::uint64_t> restarts;
   for (std::uint64_t g = 1; g <= 20; ++g) {
     run.generation();
-    const std::vector<Member> members = run.optimiser().members();
+    const std::vector<Individual> members = run.optimiser().members();
     const auto random = std::count_if(members.begin(), members.end(),
-                                      [](const Member& m) { return m.operators == "random"; });
+                                      [](const Individual& m) { return m.origin == kRandom; });
     if (g > 1 && random == 8) restarts.push_back(g);
     EXPECT_EQ(members.front().birth_id, 0U);
     if (g > 1) {
-      EXPECT_EQ(members.front().operators, "elite");
+      EXPECT_EQ(members.front().origin, kElite);
     }
   }
   EXPECT_EQ(run.optimiser().last_improvement(), 1U);
@@ -273,17 +273,18 @@ TEST(Outcomes, FailuresRankBehindEveryScoreAndAreSurvived) {
   };
   for (int i = 0; i < 30; ++i) {
     run.generation();
-    const std::vector<Member> members = run.optimiser().members();
-    EXPECT_TRUE(std::is_partitioned(members.begin(), members.end(),
-                                    [](const Member& m) { return m.outcome == v1::OK; }));
+    const std::vector<Individual> members = run.optimiser().members();
+    EXPECT_TRUE(std::is_partitioned(members.begin(), members.end(), [](const Individual& m) {
+      return m.standing.outcome == v1::OK;
+    }));
   }
-  EXPECT_EQ(run.optimiser().best().outcome, v1::OK);
-  EXPECT_NEAR(run.optimiser().best().cost, 0.5, 0.01);
+  EXPECT_EQ(run.optimiser().best().standing.outcome, v1::OK);
+  EXPECT_NEAR(run.optimiser().best().standing.cost, 0.5, 0.01);
 
   ToyRun hopeless(sphere(3), settings_with(20), 6);
   hopeless.scorer = [](const Candidate&) { return Score{v1::FELL_OVER, 0}; };
   for (int i = 0; i < 5; ++i) hopeless.generation();
-  EXPECT_EQ(hopeless.optimiser().best().outcome, v1::FELL_OVER);
+  EXPECT_EQ(hopeless.optimiser().best().standing.outcome, v1::FELL_OVER);
 }
 
 // A flat cost of 0 with unit noise, but for one choice out of five that is truly better by 1.5. The
@@ -299,8 +300,8 @@ TEST(Noise, TheRescoredEliteIsTheTrulyBetterOne) {
     run.scorer = [&](const Candidate& c) { return noisy_score(run, toy, c); };
     for (int i = 0; i < 40; ++i) run.generation();
     EXPECT_EQ(toy.cost(run.values(run.optimiser().best().genome)), -1.5) << seed;
-    EXPECT_EQ(run.optimiser().best().scores, 20U);
-    EXPECT_NEAR(run.optimiser().best().cost, -1.5, 0.8) << seed;
+    EXPECT_EQ(run.optimiser().best().standing.scores, 20U);
+    EXPECT_NEAR(run.optimiser().best().standing.cost, -1.5, 0.8) << seed;
   }
 }
 
@@ -318,7 +319,7 @@ TEST(Noise, EveryReplicateIsFreshAndTheirNumberIsLimited) {
     }
     EXPECT_EQ(run.optimiser().members().front().birth_id, run.optimiser().best().birth_id);
     if (i > 1) {
-      EXPECT_EQ(run.optimiser().best().scores, 5U);
+      EXPECT_EQ(run.optimiser().best().standing.scores, 5U);
     }
   }
 }

@@ -150,8 +150,8 @@ TEST(Islands, LearnFromOneAnother) {
     bool from_elsewhere = false;
     for (int i = 0; i < 12; ++i) {
       run.generation();
-      for (const Member& member : run.optimiser().members()) {
-        from_elsewhere |= member.operators == "migrant";
+      for (const Individual& member : run.optimiser().members()) {
+        from_elsewhere |= member.origin == kMigrant;
         for (const std::uint64_t parent : member.parents) {
           from_elsewhere |= parent % 5 != member.birth_id % 5;
         }
@@ -175,7 +175,8 @@ TEST(Islands, LearnOneCovarianceTogether) {
       ToyRun run(toy_of(function), settings, seed);
       const double wanted = function.least + 1e-6 * initial_gap(function, seed);
       do run.generation();
-      while (run.optimiser().best().cost > wanted && run.optimiser().evaluations() < 50000);
+      while (run.optimiser().best().standing.cost > wanted &&
+             run.optimiser().evaluations() < 50000);
       sum += run.optimiser().evaluations();
     }
     return static_cast<double>(sum);

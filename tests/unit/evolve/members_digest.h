@@ -13,14 +13,14 @@ namespace gapfarm {
 
 // Over the generation's number and each member's birth id, genome, outcome, cost and number of
 // scores, by their bits.
-inline std::string members_digest(std::uint64_t generation, std::span<const Member> members) {
+inline std::string members_digest(std::uint64_t generation, std::span<const Individual> members) {
   Hasher hasher;
   hasher.add(generation).add(static_cast<std::uint64_t>(members.size()));
-  for (const Member& member : members) {
+  for (const Individual& member : members) {
     hasher.add(member.birth_id).add(static_cast<std::uint64_t>(member.genome.size()));
     for (const double gene : member.genome) hasher.add(gene);
-    hasher.add(static_cast<std::uint64_t>(member.outcome)).add(member.cost);
-    hasher.add(static_cast<std::uint64_t>(member.scores));
+    hasher.add(static_cast<std::uint64_t>(member.standing.outcome)).add(member.standing.cost);
+    hasher.add(static_cast<std::uint64_t>(member.standing.scores));
   }
   return hasher.finish();
 }

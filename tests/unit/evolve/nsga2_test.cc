@@ -90,11 +90,11 @@ Toy toy_of(std::size_t genes) {
   return toy;
 }
 
-std::vector<Costs> front_of(const ToyRun& run, const std::vector<Member>& members) {
+std::vector<Costs> front_of(const ToyRun& run, const std::vector<Individual>& members) {
   static_cast<void>(run);
   std::vector<Costs> all;
-  for (const Member& member : members) {
-    if (member.outcome == v1::OK) all.push_back(member.costs);
+  for (const Individual& member : members) {
+    if (member.standing.outcome == v1::OK) all.push_back(member.standing.costs);
   }
   std::vector<Costs> front;
   for (const std::size_t i : first_front(all)) front.push_back(all[i]);
@@ -118,7 +118,7 @@ TEST(Nsga2, ReachesFrontsKnownInClosedForm) {
     EXPECT_LT(hypervolume(front, reference), function.volume) << function.name;
     EXPECT_EQ(members.size(), 100u);
     EXPECT_EQ(members.front().birth_id, run.optimiser().best().birth_id);
-    EXPECT_EQ(members.front().costs, front[knee_of(front)]);
+    EXPECT_EQ(members.front().standing.costs, front[knee_of(front)]);
   }
 }
 
@@ -140,8 +140,8 @@ TEST(Nsga2, MixedGenesConstraintsAndFailuresGoOnToTheBitAfterASave) {
   EXPECT_EQ(digests(straight, 30, false), digests(reloaded, 30, true));
   const auto members = straight.optimiser().members();
   std::set<Genome> genomes;
-  for (const Member& member : members) {
-    EXPECT_EQ(member.outcome, v1::OK) << "what fails or violates has gone";
+  for (const Individual& member : members) {
+    EXPECT_EQ(member.standing.outcome, v1::OK) << "what fails or violates has gone";
     genomes.insert(member.genome);
   }
   EXPECT_EQ(genomes.size(), members.size()) << "no two alike";
@@ -190,7 +190,7 @@ TEST(Nsga2, UnderNoiseTheFrontIsScoredAgain) {
   for (int i = 0; i < 12; ++i) run.generation();
   const auto members = run.optimiser().members();
   unsigned most = 0;
-  for (const Member& member : members) most = std::max(most, member.scores);
+  for (const Individual& member : members) most = std::max(most, member.standing.scores);
   EXPECT_EQ(most, 4u);
   EXPECT_THAT(run.optimiser().operator_probabilities().size(), 2u);
 }

@@ -51,7 +51,7 @@ double reached(const Toy& toy, const EvolutionSettings& settings, std::uint64_t 
   for (std::uint64_t seed = 1; seed <= 7; ++seed) {
     ToyRun run(toy, settings, seed);
     run.until(evaluations);
-    costs.push_back(run.optimiser().best().cost);
+    costs.push_back(run.optimiser().best().standing.cost);
   }
   std::sort(costs.begin(), costs.end());
   return costs[costs.size() / 2];
@@ -68,7 +68,7 @@ std::uint64_t needed(OptimiserKind kind, std::string_view name, bool rotated = t
     const double target = 1e-6 * initial_gap(function, seed);
     ToyRun run(toy_of(function), settings_for(kind), seed);
     do run.generation();
-    while (run.optimiser().best().cost > target && run.optimiser().evaluations() < 20000);
+    while (run.optimiser().best().standing.cost > target && run.optimiser().evaluations() < 20000);
     all.push_back(run.optimiser().evaluations());
   }
   std::sort(all.begin(), all.end());
@@ -179,11 +179,11 @@ TEST(DeSimplex, PolishesWhatDifferentialEvolutionFound) {
   for (int i = 0; i < 30; ++i) run.generation();
   const std::uint64_t spent = run.optimiser().evaluations();
   EXPECT_NEAR(static_cast<double>(spent), 900, 20) << "but for trial vectors that changed nothing";
-  const double before = run.optimiser().best().cost;
+  const double before = run.optimiser().best().standing.cost;
   run.generation();
   EXPECT_LE(run.optimiser().evaluations(), spent + 1) << "the simplex goes point by point";
   run.until(1200);
-  EXPECT_LT(run.optimiser().best().cost, 1e-3 * before);
+  EXPECT_LT(run.optimiser().best().standing.cost, 1e-3 * before);
 }
 
 TEST(RandomSearch, IsUniform) {
@@ -209,9 +209,9 @@ TEST_P(EveryOptimiser, BeatsNothingAndNeverLosesItsBest) {
       EXPECT_TRUE(births.insert(candidate.birth_id).second);
       for (const double gene : candidate.genome) EXPECT_TRUE(gene >= 0 && gene <= 1);
     }
-    EXPECT_LE(run.optimiser().best().cost, best);
-    best = run.optimiser().best().cost;
-    EXPECT_EQ(run.optimiser().members().front().cost, best);
+    EXPECT_LE(run.optimiser().best().standing.cost, best);
+    best = run.optimiser().best().standing.cost;
+    EXPECT_EQ(run.optimiser().members().front().standing.cost, best);
   }
   EXPECT_LT(best, 1.5);
 }
@@ -271,9 +271,9 @@ TEST_P(EveryOptimiser, SurvivesFailures) {
       return {v1::OK, c.genome[0]};
     };
     for (int i = 0; i < 200; ++i) run.generation();
-    EXPECT_EQ(run.optimiser().best().outcome, hopeless ? v1::DIVERGED : v1::OK);
+    EXPECT_EQ(run.optimiser().best().standing.outcome, hopeless ? v1::DIVERGED : v1::OK);
     if (!hopeless) {
-      EXPECT_NEAR(run.optimiser().best().cost, 0.5, 0.1);
+      EXPECT_NEAR(run.optimiser().best().standing.cost, 0.5, 0.1);
     }
   }
 }

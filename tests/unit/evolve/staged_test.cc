@@ -69,10 +69,10 @@ TEST_P(Staged, SearchesSomeGenesFirstAndKeepsWhatItFound) {
         EXPECT_EQ(c.genome, best_before);
       }
     }
-    EXPECT_LE(optimiser->best().cost, best);
-    EXPECT_EQ(optimiser->best().cost, cost(optimiser->best().genome));
-    EXPECT_EQ(optimiser->members().front().cost, optimiser->best().cost);
-    best = optimiser->best().cost;
+    EXPECT_LE(optimiser->best().standing.cost, best);
+    EXPECT_EQ(optimiser->best().standing.cost, cost(optimiser->best().genome));
+    EXPECT_EQ(optimiser->members().front().standing.cost, optimiser->best().standing.cost);
+    best = optimiser->best().standing.cost;
   }
   ASSERT_EQ(after_first.size(), 4U);
   EXPECT_EQ(optimiser->best().genome[0], after_first[0]) << "the second stage leaves gene 0 alone";
@@ -86,7 +86,7 @@ TEST_P(Staged, ContinuesBitForBitFromEveryGeneration) {
   auto straight = make_staged(setup_, stages_).value();
   auto interrupted = make_staged(setup_, stages_).value();
   for (int i = 0; i < 60; ++i) {
-    interrupted = restore_staged(setup_, stages_, interrupted->state()).value();
+    interrupted = restored(make_staged(setup_, stages_), interrupted->state()).value();
     generation(*straight);
     generation(*interrupted);
     ASSERT_EQ(members_digest(straight->generation(), straight->members()),
@@ -100,8 +100,8 @@ TEST_P(Staged, ContinuesBitForBitFromEveryGeneration) {
 TEST_P(Staged, RefusesForeignStates) {
   auto optimiser = make_staged(setup_, stages_).value();
   for (int i = 0; i < 3; ++i) generation(*optimiser);
-  EXPECT_FALSE(restore_staged(setup_, {{{0, 1, 2}, 10}, {{3}, 0}}, optimiser->state()).ok());
-  EXPECT_FALSE(restore_staged(setup_, stages_, "nonsense").ok());
+  EXPECT_FALSE(restored(make_staged(setup_, {{{0, 1, 2}, 10}, {{3}, 0}}), optimiser->state()).ok());
+  EXPECT_FALSE(restored(make_staged(setup_, stages_), "nonsense").ok());
   OptimiserSetup bare = setup_;
   bare.nominal.clear();
   EXPECT_THAT(make_staged(bare, stages_).error().message, HasSubstr("own values"));

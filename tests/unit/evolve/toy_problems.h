@@ -4,14 +4,28 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
 
-#include "master/evolve/genetic/genetic.h"
+#include "master/evolve/individual.h"
 #include "master/evolve/optimisers.h"
 
 namespace gapfarm {
+
+// `made` in the state of another optimiser.
+inline Result<std::unique_ptr<Optimiser>> restored(Result<std::unique_ptr<Optimiser>> made,
+                                                   std::string_view state) {
+  if (!made) return made;
+  if (const Status status = (*made)->restore(state); !status) return status.error();
+  return made;
+}
+
+inline Result<std::unique_ptr<Optimiser>> restore_optimiser(const OptimiserSetup& setup,
+                                                            std::string_view state) {
+  return restored(make_optimiser(setup), state);
+}
 
 struct Toy {
   std::vector<Parameter> rows;
