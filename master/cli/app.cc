@@ -11,6 +11,7 @@
 #include <iostream>
 
 #include "common/base/build_info.h"
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/process/stop.h"
 #include "common/usage/usage.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/ranges.h"
 #include "common/net/envelope.h"
 #include "common/problem/question.h"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 
 namespace gapfarm {

@@ -333,10 +333,7 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   text += "\nconditions   " + std::to_string(summary.conditions) +
           " distinct, each simulated once " + "an evaluation";
   text += "\neffects      ";
-  if (summary.effects.empty()) text += "none";
-  for (std::size_t i = 0; i < summary.effects.size(); ++i) {
-    text += (i ? ", " : "") + summary.effects[i];
-  }
+  text += summary.effects.empty() ? "none" : joined(summary.effects);
   text += "\nfitness      " + std::string(fitness_name(problem.fitness.kind)) +
           (higher_is_better(problem.fitness.kind) ? ", higher is better" : ", lower is better");
   return text + search_text(config, summary, workers);

@@ -105,8 +105,7 @@ BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
   hooks.start_farm = [&options, &config, &context] { return start(options, config, context); };
   hooks.note = [&context](const std::string& sentence) { context.console.note(sentence); };
   hooks.progress = [&context, stage = std::size_t{0}](const std::string& what, std::size_t done,
-                                                      std::size_t total,
-                                                      double /*elapsed_s*/) mutable {
+                                                      std::size_t total) mutable {
     const std::size_t k = stage_of(what, stage);
     if (k != stage) context.work->stage(k);
     stage = k;
@@ -127,12 +126,7 @@ Result<int> show_strengths(const BlindCheckOptions& options, const Config& confi
   // The rest is made of the same effects and robots.
   design.nulls = design.pairs = design.excluded = 0;
   const BlindCheckHooks hooks = hooks_of(options, config, context);
-  const double begin = monotonic_seconds();
-  ASSIGN_OR_RETURN(const auto drawn,
-                   draw_design(planned, design, *farm,
-                               [&](const std::string& what, std::size_t done, std::size_t total) {
-                                 hooks.progress(what, done, total, monotonic_seconds() - begin);
-                               }));
+  ASSIGN_OR_RETURN(const auto drawn, draw_design(planned, design, *farm, hooks.progress));
   const std::size_t trials = planned.log.trials.size();
   const std::string table = format_design(drawn, planned.table());
   context.console.result(std::to_string(trials) +

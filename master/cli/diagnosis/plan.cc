@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/trials/select.h"
 #include "common/trials/write.h"
@@ -113,8 +114,7 @@ std::string table_text(const plan::DesignedPlan& plan) {
       "(geometric mean).\n",
       std::ceil(100 * (1 - plan.best_share)));
   const auto list = [&](const std::vector<std::string>& names, const std::string& label) {
-    for (std::size_t k = 0; k < names.size(); ++k) text += (k == 0 ? "" : ", ") + names[k];
-    if (!names.empty()) text += label + "\n";
+    if (!names.empty()) text += joined(names) + label + "\n";
   };
   list(plan.not_planned_for, ": do not move where trials end, only how far repeats scatter");
   list(plan.without_shift, ": could not be simulated with this robot");

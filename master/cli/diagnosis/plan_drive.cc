@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/parameters/ground.h"
 #include "common/problem/run_files.h"
@@ -105,8 +107,8 @@ Result<std::vector<Interval>> limits_of(const std::vector<std::string>& texts,
       std::string names;
       for (const std::string& channel : channels) names += (names.empty() ? "" : ", ") + channel;
       return Error{"--limit is '" + text + "', expected CHANNEL=MOST or CHANNEL=LEAST,MOST with " +
-                   "one of the robot's channels " + names + ", such as " + channels.front() +
-                   "=0.5"};
+                   "one of the robot's channels " + joined(channels) + ", such as " +
+                   channels.front() + "=0.5"};
     }
     limits[name] = {*first, *last};
   }

@@ -2,6 +2,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "common/trials/read.h"

@@ -5,7 +5,6 @@
 
 #include "common/base/hash.h"
 #include "common/base/try.h"
-#include "common/process/process_pool.h"
 #include "common/trials/files.h"
 #include "common/trials/write.h"
 #include "master/experiments/blind_check/cases/seal.h"
@@ -24,13 +23,6 @@ struct InHand {
   std::vector<SealedTruth> sealed;
   std::vector<OutOfReach> out_of_reach;
 };
-
-DesignProgress timed(const BlindCheckHooks& hooks) {
-  const double begin = monotonic_seconds();
-  return [&hooks, begin](const std::string& what, std::size_t done, std::size_t total) {
-    if (hooks.progress) hooks.progress(what, done, total, monotonic_seconds() - begin);
-  };
-}
 
 std::string key_path_of(const BlindCheckSettings& settings) {
   return settings.key_path.empty() ? settings.out + ".key" : settings.key_path;
@@ -72,13 +64,12 @@ Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settin
   RETURN_IF_ERROR(check_fresh(paths));
   RETURN_IF_ERROR(make_out(paths.out));
   ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
-  const DesignProgress progress = timed(hooks);
   ASSIGN_OR_RETURN(const auto planned,
                    planned_problem(config, settings.plan, settings.design.seed, *farm));
-  ASSIGN_OR_RETURN(const auto design, draw_design(planned, settings.design, *farm, progress));
+  ASSIGN_OR_RETURN(const auto design, draw_design(planned, settings.design, *farm, hooks.progress));
   if (design.cases.empty()) return Error{"the design holds no case; ask for effects or nulls"};
   ASSIGN_OR_RETURN(const auto logs,
-                   simulate_cases(config, design.cases, settings.plan, 0, *farm, progress));
+                   simulate_cases(config, design.cases, settings.plan, 0, *farm, hooks.progress));
   RETURN_IF_ERROR(write_cases(design.cases, logs, paths));
 
   InHand hand{TruthKey::random(), {}, design.out_of_reach};
@@ -166,7 +157,7 @@ Status add_realised(const Config& config, const BlindCheckSettings& settings,
   if (diagnosed.empty()) return {};
   ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
   ASSIGN_OR_RETURN(const auto fresh,
-                   score_fresh_logs(config, diagnosed, settings.plan, *farm, timed(hooks)));
+                   score_fresh_logs(config, diagnosed, settings.plan, *farm, hooks.progress));
   for (std::size_t i = 0; i < owner.size(); ++i) {
     if (!fresh[i]) continue;
     cases[owner[i]].fresh = fresh[i];

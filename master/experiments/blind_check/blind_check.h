@@ -29,10 +29,7 @@ namespace gapfarm {
 struct BlindCheckHooks {
   // Farm work comes in two stages, with the diagnoses between; the farm goes after each.
   std::function<Result<std::unique_ptr<Farm>>()> start_farm;
-  // What is being done, how much of it is done, and the seconds since it began.
-  std::function<void(const std::string& what, std::size_t done, std::size_t total,
-                     double elapsed_s)>
-      progress;
+  DesignProgress progress;
   std::function<void(const std::string& sentence)> note;
   // Before the first diagnosis, with the truths sealed: whatever else would reveal them has to go.
   // May be empty.

@@ -152,7 +152,6 @@ const char* child_state_name(ChildState state) {
 
 Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& options) {
   Crowd crowd(options);
-  const double begin = monotonic_seconds();
   std::size_t started = 0;
   std::size_t ended = 0;
   while (ended < jobs.size()) {
@@ -165,7 +164,7 @@ Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& op
     crowd.wait();
     ended += crowd.reap();
     crowd.enforce_limit();
-    if (options.on_tick) options.on_tick(ended, monotonic_seconds() - begin);
+    if (options.on_tick) options.on_tick(ended);
   }
   return {};
 }

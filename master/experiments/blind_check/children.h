@@ -34,8 +34,7 @@ struct ChildrenOptions {
   // Exit statuses that count as done.
   std::function<bool(int status)> done = [](int status) { return status == 0; };
   std::function<void(const ChildJob& job, const ChildEnd& end)> on_end;
-  // Now and then: how many have ended, and the seconds since the first start.
-  std::function<void(std::size_t ended, double elapsed_s)> on_tick;
+  std::function<void(std::size_t ended)> on_tick;  // now and then
 };
 
 // Runs all jobs in order; returns when the last has ended.  Every child leads a process group of

@@ -114,8 +114,8 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
       hooks.note(job.id + ": the diagnosis " + end.text + "; see " + job.log_path);
     }
   };
-  options.on_tick = [&](std::size_t ended, double elapsed_s) {
-    if (hooks.progress) hooks.progress("cases diagnosed", ended, jobs.size(), elapsed_s);
+  options.on_tick = [&](std::size_t ended) {
+    if (hooks.progress) hooks.progress("cases diagnosed", ended, jobs.size());
   };
   RETURN_IF_ERROR(run_children(jobs, options));
   return written;

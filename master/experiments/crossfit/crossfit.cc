@@ -265,45 +265,38 @@ EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
 Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const CrossfitPlan& plan,
                                             Farm& farm) {
   Crossfit fit(problem, plan, farm);
-  std::vector<CrossfitGroup> groups;
-  if (plan.by.empty()) {
-    RETURN_IF_ERROR(fit.check(problem.log));
-    plan.hooks.planned(stages_of({""}, plan, problem.genes.size()));
-    plan.hooks.began(0);
-    ASSIGN_OR_RETURN(auto group, fit.group("", problem.log));
-    groups.push_back(std::move(group));
-    return groups;
+  std::vector<std::string> values = {""};
+  if (!plan.by.empty()) {
+    ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
+    values = values_in(problem.log, by);
   }
-  ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
-  const std::vector<std::string> values = values_in(problem.log, by);
+  const auto named = [&](const std::string& value, const Error& error) {
+    return plan.by.empty() ? error : Error{plan.by + "=" + value + ": " + error.message};
+  };
+  std::vector<TrialLog> logs;
   for (const std::string& value : values) {
-    const std::string filter = plan.by + "=" + value;
-    ASSIGN_OR_RETURN(const auto log, select_trials(problem.log, {&filter, 1}));
-    if (Status s = fit.check(log); !s) return Error{filter + ": " + s.error().message};
+    std::vector<std::string> filters;
+    if (!plan.by.empty()) filters.push_back(plan.by + "=" + value);
+    ASSIGN_OR_RETURN(auto log, select_trials(problem.log, filters));
+    if (Status s = fit.check(log); !s) return named(value, s.error());
+    logs.push_back(std::move(log));
   }
   plan.hooks.planned(stages_of(values, plan, problem.genes.size()));
-  for (const std::string& value : values) {
-    plan.hooks.began(groups.size());
-    const std::string filter = plan.by + "=" + value;
-    ASSIGN_OR_RETURN(const auto log, select_trials(problem.log, {&filter, 1}));
-    auto group = fit.group(value, log);
-    if (!group) return Error{filter + ": " + group.error().message};
+  std::vector<CrossfitGroup> groups;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    plan.hooks.began(k);
+    auto group = fit.group(values[k], logs[k]);
+    if (!group) return named(values[k], group.error());
     groups.push_back(std::move(*group));
   }
   return groups;
 }
 
 Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings) {
-  OptimiserSetup setup;
-  setup.settings = settings.evolution;
-  setup.table = &problem.table();
-  setup.genes = problem.genes;
-  setup.run_seed = settings.seed;
-  setup.noisy =
-      problem.spread.kind == SpreadKind::kSampled && !compares_means(problem.fitness.kind);
-  for (const Gene& gene : problem.genes) {
-    setup.nominal.push_back(encode_gene(problem.table(), gene, problem.values[gene.row]));
-  }
+  OptimiserSetup setup = optimiser_setup(settings.evolution, problem, settings.seed);
+  setup.nominal = mapped(problem.genes, [&](const Gene& gene) {
+    return encode_gene(problem.table(), gene, problem.values[gene.row]);
+  });
   ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
   Backend backend(problem, farm, settings.seed);
   NoSink sink;

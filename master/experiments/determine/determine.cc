@@ -135,9 +135,8 @@ class Determination {
     // Most often the first box will do.
     const std::uint64_t probes = 1 + 2 * std::size(kProbes) * moving_.size();
     const std::uint64_t points = points_of_a_box();
-    const auto real = [](std::uint64_t tasks) { return static_cast<double>(tasks); };
-    hooks_.planned({{"find how far to look", real(probes), probes},
-                    {"fit the likelihood", real(points), points}});
+    hooks_.planned({{"find how far to look", double(probes), probes},
+                    {"fit the likelihood", double(points), points}});
     hooks_.began(0);
     RETURN_IF_ERROR(find_widths());
     hooks_.began(1);

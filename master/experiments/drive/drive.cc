@@ -14,7 +14,8 @@ namespace {
 constexpr double kShortest_s = 0.01;
 constexpr double kPause_s = 1;  // between commands of a list
 
-Trial planned(const CommandSpec& command, std::size_t index, double t_s, const Pose& X_WS) {
+Trial planned_leg(const CommandSpec& command, std::size_t index, double t_s, const Pose& X_WS,
+                  const DriveSettings& settings) {
   Trial trial;
   trial.session = "drive";
   trial.trial = static_cast<std::int64_t>(index) + 1;
@@ -23,7 +24,8 @@ Trial planned(const CommandSpec& command, std::size_t index, double t_s, const P
   trial.left = command.left;
   trial.right = command.right;
   trial.duration_s = command.duration_s;
-  trial.X_WS = trial.X_WE = X_WS;
+  trial.X_WS = {X_WS.x - settings.frame_x_m, X_WS.y - settings.frame_y_m, X_WS.theta};
+  trial.X_WE = trial.X_WS;
   return trial;
 }
 
@@ -58,6 +60,10 @@ Status drive_leg(const Mover& mover, std::uint64_t leg, std::vector<Pose>& at,
     runs[r].push_back(std::move(legs[r]));
   }
   return {};
+}
+
+bool same_duties(const CommandSpec& a, const CommandSpec& b) {
+  return a.name == b.name && a.left == b.left && a.right == b.right;
 }
 
 Error unknown(const CommandSpec& command, const std::string& who) {
@@ -134,8 +140,7 @@ class MinedMover final : public Mover {
   const CommandMotion* closest(const CommandSpec& command) const {
     const CommandMotion* found = nullptr;
     for (const CommandMotion& motion : motions_) {
-      const CommandSpec& c = motion.command;
-      if (c.name != command.name || c.left != command.left || c.right != command.right) continue;
+      if (!same_duties(motion.command, command)) continue;
       const auto off = [&](const CommandMotion& m) {
         return std::abs(m.command.duration_s - command.duration_s);
       };
@@ -173,7 +178,8 @@ class SimulatedMover final : public Mover {
       simulate->set_path_interval(settings_.interval_s);
       v1::PlannedTrial* planned = simulate->add_plan();
       planned->set_moved(true);
-      *planned->mutable_trial() = planned_trial(start);
+      *planned->mutable_trial() =
+          to_proto(planned_leg(start.command, start.leg, 0, start.X_WS, settings_));
       tasks.push_back(std::move(task));
     }
     ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
@@ -191,21 +197,6 @@ class SimulatedMover final : public Mover {
   }
 
  private:
-  v1::Trial planned_trial(const Start& start) const {
-    Trial trial;
-    trial.session = "drive";
-    trial.trial = static_cast<std::int64_t>(start.leg) + 1;
-    trial.t_s = 0;
-    trial.command = start.command.name;
-    trial.left = start.command.left;
-    trial.right = start.command.right;
-    trial.duration_s = start.command.duration_s;
-    trial.X_WS = {start.X_WS.x - settings_.frame_x_m, start.X_WS.y - settings_.frame_y_m,
-                  start.X_WS.theta};
-    trial.X_WE = trial.X_WS;
-    return to_proto(trial);
-  }
-
   Farm& farm_;
   DriveSettings settings_;
   std::string hash_;
@@ -266,9 +257,7 @@ Result<std::vector<DrivenRun>> drive_commands(Farm& farm, const Problem& problem
     for (std::size_t c = 0; c < commands.size(); ++c) {
       v1::PlannedTrial* plan = simulate->add_plan();
       plan->set_moved(c == 0);
-      *plan->mutable_trial() =
-          to_proto(planned(commands[c], c, t_s,
-                           {X_WS.x - settings.frame_x_m, X_WS.y - settings.frame_y_m, X_WS.theta}));
+      *plan->mutable_trial() = to_proto(planned_leg(commands[c], c, t_s, X_WS, settings));
       t_s += commands[c].duration_s + kPause_s;
     }
     tasks.push_back(std::move(task));

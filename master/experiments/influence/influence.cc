@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/rank_tests.h"
 #include "common/random/stream.h"
@@ -58,10 +59,9 @@ class InfluenceStudy {
     const std::uint64_t standard = traces * (1 + 2 * settings_.repeats);
     const std::uint64_t alone = traces * levels * settings_.repeats;
     const std::uint64_t walks = traces * settings_.trajectories * (genes_.size() + 3);
-    const auto real = [](std::uint64_t tasks) { return static_cast<double>(tasks); };
-    hooks_.planned({{"repeat the standard", real(standard), standard},
-                    {"move one parameter at a time", real(alone), alone},
-                    {"walk through the box (Morris)", real(walks), walks}});
+    hooks_.planned({{"repeat the standard", double(standard), standard},
+                    {"move one parameter at a time", double(alone), alone},
+                    {"walk through the box (Morris)", double(walks), walks}});
   }
 
   Status standard() {
@@ -185,15 +185,6 @@ class InfluenceStudy {
     return std::min(1.0, least_p * static_cast<double>(std::max<std::size_t>(levels.size(), 1)));
   }
 
-  std::vector<v1::Override> overrides_of(const Genome& genome) const {
-    std::vector<v1::Override> overrides;
-    for (std::size_t i = 0; i < genes_.size(); ++i) {
-      overrides.push_back(
-          override_of(genes_[i].row, decode_gene(problem_.table(), genes_[i], genome[i])));
-    }
-    return overrides;
-  }
-
   Status morris() {
     hooks_.began(2);
     const std::size_t k = genes_.size();
@@ -210,12 +201,13 @@ class InfluenceStudy {
       }
       orders.push_back(stream.permutation(k));
       for (std::uint64_t side = 0; side < 2; ++side) {
-        requests.push_back({overrides_of(genome), kMorrisNoise + 2 * t + side});
+        requests.push_back(
+            {overrides_of(problem_.table(), genes_, genome), kMorrisNoise + 2 * t + side});
       }
-      requests.push_back({overrides_of(genome), std::nullopt});
+      requests.push_back({overrides_of(problem_.table(), genes_, genome), std::nullopt});
       for (const std::size_t i : orders.back()) {
         genome[i] += down[i] ? -kMorrisStep : kMorrisStep;
-        requests.push_back({overrides_of(genome), std::nullopt});
+        requests.push_back({overrides_of(problem_.table(), genes_, genome), std::nullopt});
       }
     }
     ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));

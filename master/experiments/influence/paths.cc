@@ -55,6 +55,15 @@ std::span<const PathPoint> first(const std::vector<PathPoint>& path, std::size_t
 
 }  // namespace
 
+std::vector<v1::Override> overrides_of(const ParameterTable& table, const std::vector<Gene>& genes,
+                                       const Genome& genome) {
+  std::vector<v1::Override> overrides;
+  for (std::size_t i = 0; i < genome.size(); ++i) {
+    overrides.push_back(override_of(genes[i].row, decode_gene(table, genes[i], genome[i])));
+  }
+  return overrides;
+}
+
 std::size_t traces_of_a_set(const Problem& problem, const TraceSettings& settings) {
   return settings.trials.size() + (problem.pieces.empty() ? settings.commands.size() : 0);
 }

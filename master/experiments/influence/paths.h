@@ -35,6 +35,9 @@ struct TraceRequest {
   std::optional<std::uint64_t> repeat;  // names the noise; none: the nominal motion
 };
 
+std::vector<v1::Override> overrides_of(const ParameterTable& table, const std::vector<Gene>& genes,
+                                       const Genome& genome);
+
 // Tasks that trace_paths() asks for each request.
 std::size_t traces_of_a_set(const Problem& problem, const TraceSettings& settings);
 

@@ -13,15 +13,6 @@ namespace {
 constexpr std::uint64_t kFreshNoise = 1u << 20;
 constexpr int kMostIdleRounds = 100;
 
-std::vector<v1::Override> overrides_of(const Problem& problem, const Genome& genome) {
-  std::vector<v1::Override> overrides;
-  for (std::size_t i = 0; i < genome.size(); ++i) {
-    const Gene& gene = problem.genes[i];
-    overrides.push_back(override_of(gene.row, decode_gene(problem.table(), gene, genome[i])));
-  }
-  return overrides;
-}
-
 class Search {
  public:
   Search(Farm& farm, const Problem& problem, const StabilitySettings& settings)
@@ -33,7 +24,8 @@ class Search {
     std::vector<TraceRequest> requests;
     for (const Genome& genome : genomes) {
       for (unsigned r = 0; r < settings_.repeats; ++r) {
-        requests.push_back({overrides_of(problem_, genome), first_repeat + r});
+        requests.push_back(
+            {overrides_of(problem_.table(), problem_.genes, genome), first_repeat + r});
       }
     }
     ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));

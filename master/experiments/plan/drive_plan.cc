@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/random/stream.h"
 #include "master/experiments/plan/drive_knowledge.h"
@@ -93,9 +94,8 @@ class Planner {
         return row.name == wanted.name;
       });
       if (found == rows_.end()) {
-        std::string names;
-        for (const KinematicRow& row : rows_) names += (names.empty() ? "" : ", ") + row.name;
-        return Error{"this robot has no value \"" + wanted.name + "\", expected one of " + names};
+        return Error{"this robot has no value \"" + wanted.name + "\", expected one of " +
+                     joined(rows_, ", ", &KinematicRow::name)};
       }
       index_.push_back(found - rows_.begin());
     }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "common/base/ranges.h"
 #include "common/base/shell.h"
 #include "common/base/text.h"
 

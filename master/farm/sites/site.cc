@@ -4,6 +4,7 @@
 #include <cmath>
 #include <regex>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/config/toml_section.h"
 

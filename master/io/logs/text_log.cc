@@ -4,6 +4,7 @@
 #include <ctime>
 #include <limits>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/trials/dialect.h"
 #include "common/trials/format.h"

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/base/text.h"
 #include "common/base/try.h"

@@ -154,7 +154,7 @@ TEST_F(BlindCheck, ACrashIsACountedOutcome) {
 
 TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
   fake_diagnose(kNone);
-  hooks_.progress = [this](const std::string& what, std::size_t done, std::size_t, double) {
+  hooks_.progress = [this](const std::string& what, std::size_t done, std::size_t) {
     if (what == "cases diagnosed" && done == 2) stop_.request();
   };
   const auto stopped = run();

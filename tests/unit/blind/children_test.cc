@@ -62,7 +62,7 @@ TEST_F(Children, StopEndsThemUnreported) {
   StopSource stop;
   ChildrenOptions with = options(ends);
   with.stop = &stop;
-  with.on_tick = [&stop](std::size_t, double) { stop.request(); };
+  with.on_tick = [&stop](std::size_t) { stop.request(); };
   const auto begin = std::chrono::steady_clock::now();
   const Status status = run_children({shell("slow", "exec sleep 60")}, with);
   ASSERT_FALSE(status.ok());
