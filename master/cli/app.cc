@@ -171,7 +171,7 @@ void parse_arguments(Program& program, std::vector<std::string> arguments) {
     arguments.erase(arguments.begin());
     arguments.push_back("--help");
   }
-  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
+  std::ranges::reverse(arguments);  // as CLI11 wants them
   program.app->parse(std::move(arguments));
 }
 
@@ -182,8 +182,7 @@ int run_arguments(const std::vector<std::string>& arguments) {
     parse_arguments(*program, arguments);
   } catch (const CLI::ParseError& error) {
     // What was not understood may be before the flag.
-    if (std::find(arguments.begin(), arguments.end(), "--json") != arguments.end())
-      console.use_json();
+    if (contains(arguments, "--json")) console.use_json();
     return console.end(answer_parse_error(*program->app, error, console));
   }
   if (program->json) console.use_json();

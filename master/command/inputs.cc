@@ -114,7 +114,7 @@ bool is_tcp(const std::string& endpoint) { return endpoint.rfind("tcp://", 0) ==
 Result<LinkSecurity> link_security(const FarmOptions& options,
                                    const std::vector<std::string>& endpoints) {
   LinkSecurity security;
-  if (std::none_of(endpoints.begin(), endpoints.end(), is_tcp)) return security;
+  if (std::ranges::none_of(endpoints, is_tcp)) return security;
   if (!options.insecure) return master_security(options.keys);
   security.open = options.insecure_anywhere ? OpenLinks::kAnywhere : OpenLinks::kLoopback;
   return security;

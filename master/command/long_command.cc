@@ -220,7 +220,7 @@ void LongCommand::on_progress(const RecordedProgress& progress, const Farm& farm
   }
   workers_ = farm.workers();
   fleets_ = farm.fleets();
-  const auto there = std::count_if(workers_.begin(), workers_.end(), present);
+  const auto there = std::ranges::count_if(workers_, present);
   const std::string waiting = wait.message(there, monotonic_seconds()).value_or("");
   const bool news = waiting.empty() != waiting_.empty();
   waiting_ = waiting;

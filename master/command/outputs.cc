@@ -143,8 +143,8 @@ void Outputs::reads_runs(const std::vector<std::string>& folders) {
 
 Status Outputs::check(const std::string& path, bool replace) const {
   if (is_in_place(path)) return {};
-  const auto input = std::find_if(inputs_.begin(), inputs_.end(),
-                                  [&](const std::string& other) { return same_file(path, other); });
+  const auto input = std::ranges::find_if(
+      inputs_, [&](const std::string& other) { return same_file(path, other); });
   if (input != inputs_.end()) {
     return Error{path + ": is read by this command, so it cannot be written; give another name"};
   }
@@ -238,7 +238,7 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   const std::vector<Trial>& pushes = config->problem.log.trials;
   for (std::uint32_t i = 0; i < pushes.size(); ++i) {
     const auto wanted = [&](const CommandSpec& c) { return c.name == pushes[i].command; };
-    if (std::any_of(to->commands.begin(), to->commands.end(), wanted)) to->trials.push_back(i);
+    if (std::ranges::any_of(to->commands, wanted)) to->trials.push_back(i);
   }
   if (to->trials.empty()) return Error{path + ": the log has no push of the pieces asked for"};
   return config;

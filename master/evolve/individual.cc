@@ -105,8 +105,7 @@ std::string origin_name(unsigned origin) {
 
 void Standing::add(const Score& score) {
   const auto finite = [](double c) { return std::isfinite(c); };
-  const bool all_finite =
-      finite(score.cost) && std::all_of(score.costs.begin(), score.costs.end(), finite);
+  const bool all_finite = finite(score.cost) && std::ranges::all_of(score.costs, finite);
   const bool broken = has_cost(score.outcome) && !all_finite;
   const v1::Outcome counted = broken ? v1::DIVERGED : score.outcome;
   const bool worse = scores == 0 || outcome_rank(counted) > outcome_rank(outcome);
@@ -136,7 +135,7 @@ bool better_individual(const Individual& a, const Individual& b) {
 }
 
 void sort_best_first(std::vector<Individual>& individuals) {
-  std::sort(individuals.begin(), individuals.end(), [](const Individual& a, const Individual& b) {
+  std::ranges::sort(individuals, [](const Individual& a, const Individual& b) {
     if (better_individual(a, b)) return true;
     if (better_individual(b, a)) return false;
     return a.birth_id < b.birth_id;

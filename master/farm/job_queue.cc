@@ -89,7 +89,7 @@ void JobQueue::leave_line(std::size_t index) {
 void JobQueue::hand_out(std::size_t index, const WorkerIdentity& worker, double now, v1::Job* job) {
   Job& taken = jobs_[index];
   const std::uint64_t attempt = next_attempt();
-  *std::find(taken.out.begin(), taken.out.end(), 0u) = attempt;
+  *std::ranges::find(taken.out, 0u) = attempt;
   job->set_job_id(first_job_ + index);
   job->set_attempt_id(attempt);
   job->set_problem_hash(problem_hash_);
@@ -122,7 +122,7 @@ bool JobQueue::take_retry(const WorkerIdentity& worker, const HostCounts& hosts,
     return !failed_on(worker.host) ||
            std::ranges::all_of(hosts, [&](const auto& h) { return failed_on(h.first); });
   };
-  const auto at = std::find_if(retries_.begin(), retries_.end(), fits);
+  const auto at = std::ranges::find_if(retries_, fits);
   if (at == retries_.end()) return false;
   const std::size_t index = *at;
   retries_.erase(at);
@@ -273,7 +273,7 @@ bool JobQueue::give_back(WorkerId worker, std::uint64_t attempt_id) {
   if (attempt == nullptr || !attempt->live) return false;
   withdraw(*attempt, attempt_id);
   const Job& job = jobs_[attempt->job];
-  const bool copied = std::any_of(job.out.begin(), job.out.end(), [](auto id) { return id != 0; });
+  const bool copied = std::ranges::any_of(job.out, [](auto id) { return id != 0; });
   if (job.done || job.waiting || copied) return false;
   wait_in_line(attempt->job);
   return true;

@@ -56,9 +56,9 @@ const CommandSpec& nearest_command(const std::vector<CommandSpec>& commands, dou
     const double lengths = std::hypot(c.left, c.right) * std::hypot(left, right);
     return lengths > 0 ? (c.left * left + c.right * right) / lengths : 0;
   };
-  return *std::max_element(
-      commands.begin(), commands.end(),
-      [&](const CommandSpec& a, const CommandSpec& b) { return likeness(a) < likeness(b); });
+  return *std::ranges::max_element(commands, [&](const CommandSpec& a, const CommandSpec& b) {
+    return likeness(a) < likeness(b);
+  });
 }
 
 double draw_duty(const SimulateSettings& settings, Stream& stream) {

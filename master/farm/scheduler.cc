@@ -30,8 +30,7 @@ EndCause cause_of(v1::ProcessEnd end) {
 }
 
 auto find_holding(WorkerRecord& worker, std::uint64_t attempt) {
-  return std::find_if(worker.holds.begin(), worker.holds.end(),
-                      [&](const Holding& h) { return h.attempt == attempt; });
+  return std::ranges::find_if(worker.holds, [&](const Holding& h) { return h.attempt == attempt; });
 }
 
 bool drop_holding(WorkerRecord& worker, std::uint64_t attempt) {
@@ -220,7 +219,7 @@ void Scheduler::keep_only(WorkerRecord& worker, const List& keeps, double held_s
   std::vector<Holding> kept;
   std::vector<std::uint64_t> lost;
   for (const Holding& holding : worker.holds) {
-    const bool listed = std::find(keeps.begin(), keeps.end(), holding.attempt) != keeps.end();
+    const bool listed = contains(keeps, holding.attempt);
     if (listed || holding.since >= held_since_before) {
       kept.push_back(holding);
     } else {

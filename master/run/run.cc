@@ -188,7 +188,7 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
       std::error_code code;
       return file == other || std::filesystem::equivalent(file, other, code);
     };
-    if (std::any_of(config.trial_files.begin(), config.trial_files.end(), same)) {
+    if (std::ranges::any_of(config.trial_files, same)) {
       return Error{file + " is both evolved on and held out; a validation takes other trials"};
     }
   }

@@ -31,7 +31,7 @@ std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
   std::vector<std::size_t> some;
   const std::size_t each = std::max<std::size_t>(1, (count + most - 1) / most);
   for (std::size_t i = count; i > 0; i -= std::min(i, each)) some.push_back(i - 1);
-  std::reverse(some.begin(), some.end());
+  std::ranges::reverse(some);
   return some;
 }
 

@@ -56,7 +56,7 @@ struct Search {
         below.push_back(it->path());
       }
     }
-    std::sort(below.begin(), below.end());
+    std::ranges::sort(below);
     for (const fs::path& next : below) {
       if (full()) return;
       look_into(next, depth + 1);

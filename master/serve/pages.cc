@@ -23,7 +23,7 @@ namespace {
 std::string spark(const std::vector<double>& values) {
   if (values.size() < 2) return "";
   std::vector<double> sorted = values;
-  std::sort(sorted.begin(), sorted.end());
+  std::ranges::sort(sorted);
   const double low = sorted[sorted.size() / 10], high = sorted[sorted.size() * 9 / 10];
   const double span = sorted.back() - sorted.front();
   if (!(span > 0)) return "";

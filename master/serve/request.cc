@@ -104,14 +104,13 @@ bool is_loopback_host(std::string_view host) {
   const std::size_t colon = host.rfind(':');
   if (colon != host.npos && host.find(']', colon) == host.npos) {
     const std::string_view port = host.substr(colon + 1);
-    const bool number =
-        !port.empty() && port.size() <= 5 &&
-        std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; });
+    const bool number = !port.empty() && port.size() <= 5 &&
+                        std::ranges::all_of(port, [](char c) { return c >= '0' && c <= '9'; });
     if (!number) return false;
     host = host.substr(0, colon);
   }
   constexpr std::array<std::string_view, 3> kNames = {"localhost", "127.0.0.1", "[::1]"};
-  return std::find(kNames.begin(), kNames.end(), host) != kNames.end();
+  return contains(kNames, host);
 }
 
 std::optional<HttpResponse> refusal(const HttpRequest& request) {

@@ -146,7 +146,7 @@ const Site::Kept* Site::kept(const std::string& key, const Standing& now) const 
 
 void Site::keep(const std::string& key, Kept page) {
   if (kept_.size() >= kMostKept && !kept_.contains(key)) {
-    kept_.erase(std::min_element(kept_.begin(), kept_.end(), [](const auto& a, const auto& b) {
+    kept_.erase(std::ranges::min_element(kept_, [](const auto& a, const auto& b) {
       return a.second.made_unix_s < b.second.made_unix_s;
     }));
   }

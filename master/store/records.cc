@@ -78,7 +78,7 @@ void summarise_fitness(StoredGeneration& generation, bool higher_is_better) {
   }
   generation.best = generation.mean = generation.median = generation.worst = std::nullopt;
   if (fitness.empty()) return;
-  std::sort(fitness.begin(), fitness.end());
+  std::ranges::sort(fitness);
   const std::size_t n = fitness.size();
   generation.best = higher_is_better ? fitness.back() : fitness.front();
   generation.worst = higher_is_better ? fitness.front() : fitness.back();

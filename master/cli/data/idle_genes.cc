@@ -74,8 +74,8 @@ std::string turn_on(Problem* problem, std::size_t gene) {
     if (table.effects()[e].name != effect) continue;
     const std::size_t first = table.effect_row(e);
     for (std::size_t row = first; row < first + table.effects()[e].parameters.size(); ++row) {
-      const bool searched = std::any_of(problem->genes.begin(), problem->genes.end(),
-                                        [&](const Gene& g) { return g.row == row; });
+      const bool searched =
+          std::ranges::any_of(problem->genes, [&](const Gene& g) { return g.row == row; });
       const Parameter& of = table[row];
       const double end = of.upper - of.nominal >= of.nominal - of.lower ? of.upper : of.lower;
       ParameterValues on = problem->values;

@@ -118,7 +118,7 @@ std::string command_text(const LogFigures& figures, const std::vector<CommandSpe
       return k.name == c.name && k.left == c.left && k.right == c.right &&
              k.duration_s == c.duration_s;
     };
-    if (std::any_of(known.begin(), known.end(), same)) continue;
+    if (std::ranges::any_of(known, same)) continue;
     text += fmt::format(
         "\n[commands.{}]          # the middle of its {} trials\nleft = {:g}\nright = {:g}\n"
         "duration = {:g}\n",

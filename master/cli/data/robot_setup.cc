@@ -153,7 +153,7 @@ std::string file_seen_from(const std::string& out, const std::string& file) {
 }
 
 bool names_a_robot(const std::vector<std::string>& arguments) {
-  return std::any_of(arguments.begin(), arguments.end(), is_robot_file);
+  return std::ranges::any_of(arguments, is_robot_file);
 }
 
 Result<int> run_init_robot(const std::vector<std::string>& arguments, const std::string& out,

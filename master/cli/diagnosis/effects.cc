@@ -161,8 +161,8 @@ std::vector<EffectDrives> drives_of(const Problem& problem, const v1::SimulateRe
     drives.without = logged_drive(without.trials(trial(0)));
     for (std::size_t draw = 0; draw < kFigureDraws; ++draw) {
       LoggedDrive drive = logged_drive(with.trials(trial(draw)));
-      const bool seen = std::any_of(drives.with.begin(), drives.with.end(),
-                                    [&](const LoggedDrive& other) { return alike(drive, other); });
+      const bool seen = std::ranges::any_of(
+          drives.with, [&](const LoggedDrive& other) { return alike(drive, other); });
       if (!seen) drives.with.push_back(std::move(drive));
     }
     all.push_back(std::move(drives));

@@ -79,7 +79,7 @@ std::map<std::string, Interval> recorded_limits(const std::vector<std::string>& 
       for (const CommandRow& row : run.commands) values.push_back(row.values[c]);
     }
     if (values.empty()) continue;
-    std::sort(values.begin(), values.end());
+    std::ranges::sort(values);
     const auto at = [&](double share) {
       return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
     };
@@ -102,10 +102,7 @@ Result<std::vector<Interval>> limits_of(const std::vector<std::string>& texts,
     const auto first = comma == std::string::npos
                            ? (last ? std::optional(-*last) : last)
                            : number_of(text.substr(equal + 1, comma - equal - 1));
-    if (!first || !last || *first >= *last ||
-        std::find(channels.begin(), channels.end(), name) == channels.end()) {
-      std::string names;
-      for (const std::string& channel : channels) names += (names.empty() ? "" : ", ") + channel;
+    if (!first || !last || *first >= *last || !contains(channels, name)) {
       return Error{"--limit is '" + text + "', expected CHANNEL=MOST or CHANNEL=LEAST,MOST with " +
                    "one of the robot's channels " + joined(channels) + ", such as " +
                    channels.front() + "=0.5"};

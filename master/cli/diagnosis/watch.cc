@@ -84,7 +84,7 @@ std::vector<std::string> folders_in(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     if (entry.is_directory(ignored)) names.push_back(entry.path().filename().string());
   }
-  std::sort(names.begin(), names.end(), comes_before);
+  std::ranges::sort(names, comes_before);
   return names;
 }
 
@@ -169,11 +169,11 @@ void read_logs(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
       return false;
     });
     const auto begin = [](const RunFolder& run) { return run.log.runs.front().poses.front().t_s; };
-    const bool dated = std::all_of(robot.runs.begin(), robot.runs.end(),
-                                   [&](const RunFolder& run) { return begin(run) > kEpoch_s; });
+    const bool dated = std::ranges::all_of(
+        robot.runs, [&](const RunFolder& run) { return begin(run) > kEpoch_s; });
     if (dated) {  // runs at one time stay by name
-      std::stable_sort(robot.runs.begin(), robot.runs.end(),
-                       [&](const RunFolder& a, const RunFolder& b) { return begin(a) < begin(b); });
+      std::ranges::stable_sort(
+          robot.runs, [&](const RunFolder& a, const RunFolder& b) { return begin(a) < begin(b); });
     }
   }
 }

@@ -42,7 +42,7 @@ void keep_first(std::vector<Genome>& genomes, const EvolutionSettings& settings)
 
 // A value as tables have it: a number, a choice's name, true or false.
 std::optional<double> value_of_text(const Parameter& row, const std::string& text) {
-  const auto choice = std::find(row.choices.begin(), row.choices.end(), text);
+  const auto choice = std::ranges::find(row.choices, text);
   if (choice != row.choices.end()) return static_cast<double>(choice - row.choices.begin());
   if (text == "true" || text == "True") return 1;
   if (text == "false" || text == "False") return 0;
@@ -61,8 +61,7 @@ class TableOfGenes {
       RETURN_IF_ERROR(read_row(*row, rows.front().fields.size()));
     }
     if (rows_.empty()) return text_error(path_, rows.front().end, "no rows", "rows of values");
-    std::stable_sort(rows_.begin(), rows_.end(),
-                     [](const Row& a, const Row& b) { return a.cost < b.cost; });
+    std::ranges::stable_sort(rows_, [](const Row& a, const Row& b) { return a.cost < b.cost; });
     return mapped(rows_, [](Row& row) { return std::move(row.genome); });
   }
 
@@ -78,7 +77,7 @@ class TableOfGenes {
     std::vector<std::string> ignored, missing;
     for (std::size_t c = 0; c < header.fields.size(); ++c) {
       const CsvField& field = header.fields[c];
-      const auto key = std::find(keys.begin(), keys.end(), field.text);
+      const auto key = std::ranges::find(keys, field.text);
       if (key != keys.end()) {
         auto& column = columns_[static_cast<std::size_t>(key - keys.begin())];
         if (column) return text_error(path_, field.place, field.text + " again", "a gene once");
@@ -187,7 +186,7 @@ Status change_genes(const BranchOptions& options, const std::string& run, Config
       if (before.row == gene.row && text == key) gene = before;
     }
     const double value = problem.values[gene.row];
-    if (std::find(keys.begin(), keys.end(), key) != keys.end()) {
+    if (contains(keys, key)) {
       return Error{fmt::format("--free {}: {} is a gene of {} already", text, key, run)};
     }
     if (value < gene.lower || value > gene.upper) {
@@ -198,8 +197,7 @@ Status change_genes(const BranchOptions& options, const std::string& run, Config
     }
     problem.genes.push_back(gene);
   }
-  std::sort(problem.genes.begin(), problem.genes.end(),
-            [](const Gene& a, const Gene& b) { return a.row < b.row; });
+  std::ranges::sort(problem.genes, [](const Gene& a, const Gene& b) { return a.row < b.row; });
   return {};
 }
 
@@ -212,7 +210,7 @@ struct GeneChange {
   std::vector<std::optional<std::size_t>> places() const {
     std::vector<std::optional<std::size_t>> found;
     for (const Gene& gene : after.genes) {
-      const auto old = std::find(before.genes.begin(), before.genes.end(), gene);
+      const auto old = std::ranges::find(before.genes, gene);
       found.push_back(old == before.genes.end()
                           ? std::nullopt
                           : std::optional(static_cast<std::size_t>(old - before.genes.begin())));
@@ -239,7 +237,7 @@ struct GeneChange {
     const auto from = places();
     double wider = 1, widest = 0;
     for (std::size_t g = 0; g < n; ++g) {
-      const bool kept = std::find(from.begin(), from.end(), g) != from.end();
+      const bool kept = contains(from, g);
       const double variance = spread[g * n + g];
       if (kept) widest = std::max(widest, variance);
       if (kept || variance <= 0) continue;

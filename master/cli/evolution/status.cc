@@ -72,7 +72,7 @@ std::string sparkline(const std::vector<std::optional<double>>& values, std::siz
   for (const std::optional<double>& value : values) {
     if (known(value)) sorted.push_back(*value);
   }
-  std::sort(sorted.begin(), sorted.end());
+  std::ranges::sort(sorted);
   if (sorted.empty() || width == 0) return {};
   const std::size_t tenth = sorted.size() / 10;
   const double low = sorted[higher_is_better ? tenth : 0];

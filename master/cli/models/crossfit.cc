@@ -94,7 +94,7 @@ std::string describe(const Problem& problem, const CrossfitGroup& group) {
   const auto kept = [&](const Gene& gene) {
     return group.tuned.values[gene.row] == problem.values[gene.row];
   };
-  if (std::all_of(problem.genes.begin(), problem.genes.end(), kept)) {
+  if (std::ranges::all_of(problem.genes, kept)) {
     text += "\n  nothing was gained by tuning: these are the config's own values";
   }
   text += fmt::format("\n  {:<36} {:>6} {:>8} {:>8} {:>8} {:>8} | {:>8} {:>8}\n", "mean error, mm",

@@ -28,7 +28,7 @@ Status apply_setting(const std::string& setting, Problem& problem, const std::st
   }
   const std::string text = setting.substr(equals + 1);
   const std::vector<std::string>& choices = table[*row].choices;
-  const auto choice = std::find(choices.begin(), choices.end(), text);
+  const auto choice = std::ranges::find(choices, text);
   double value = static_cast<double>(choice - choices.begin());
   if (choice == choices.end() && !CLI::detail::lexical_cast(text, value)) {
     return Error{option + " " + setting + ": '" + text + "' is not a number" +

@@ -44,8 +44,8 @@ std::vector<v1::Task> predict_tasks(const TrialLog& log) {
     const Trial& t = log.trials[i];
     return std::tuple(t.command, t.left, t.right, t.duration_s);
   };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+  std::ranges::stable_sort(order,
+                           [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
   const std::size_t parts = (order.size() + kMostTrials - 1) / kMostTrials;
   std::vector<v1::Task> tasks(std::max<std::size_t>(1, parts));
   for (v1::Task& task : tasks) task.mutable_predict();

@@ -51,7 +51,7 @@ Status apply_options(const SimulateOptions& options, Config& config) {
   }
   const std::vector<std::string> known = command_names(config.problem.commands);
   for (const std::string& name : s.commands) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
+    if (!contains(known, name)) {
       return Error{"unknown command '" + name + "'" + suggestion(name, known)};
     }
   }

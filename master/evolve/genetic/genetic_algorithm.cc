@@ -193,7 +193,7 @@ void GeneticAlgorithm::add_children(Plan& plan) {
       newborn.individual.parents.push_back(pool[rank].birth_id);
     }
     newborn.arms = std::move(child.arms);
-    newborn.parent = pool[*std::min_element(child.parents.begin(), child.parents.end())].standing;
+    newborn.parent = pool[*std::ranges::min_element(child.parents)].standing;
     plan.newborns.push_back(std::move(newborn));
   }
 }
@@ -212,9 +212,8 @@ std::vector<Individual> GeneticAlgorithm::choose_elites() const {
   count = std::min<std::size_t>(count, settings_.population - 1);
   std::vector<Individual> elites;
   const auto take = [&](const Individual& individual) {
-    const bool known = std::any_of(elites.begin(), elites.end(), [&](const Individual& elite) {
-      return elite.genome == individual.genome;
-    });
+    const bool known = std::ranges::any_of(
+        elites, [&](const Individual& elite) { return elite.genome == individual.genome; });
     if (known || elites.size() >= count) return;
     elites.push_back(individual);
     elites.back().origin = kElite;
@@ -270,7 +269,7 @@ void GeneticAlgorithm::learn(const Plan& plan) {
   std::vector<Standing> pool;
   for (const Individual& individual : population_) pool.push_back(individual.standing);
   for (const Newborn& newborn : plan.newborns) pool.push_back(newborn.individual.standing);
-  std::sort(pool.begin(), pool.end(), better);
+  std::ranges::sort(pool, better);
   const auto worse_or_equal = [&](const Standing& standing) {
     return pool.end() - std::lower_bound(pool.begin(), pool.end(), standing, better);
   };

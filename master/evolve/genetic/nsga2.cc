@@ -220,7 +220,7 @@ void Nsga2::select(std::vector<Individual> all) {
       all.size(),
       [&](std::size_t a, std::size_t b) { return beats(all[a].standing, all[b].standing); });
   std::vector<std::vector<Individual>> fronts(
-      numbers.empty() ? 0 : *std::max_element(numbers.begin(), numbers.end()) + 1);
+      numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1);
   for (std::size_t i = 0; i < all.size(); ++i) fronts[numbers[i]].push_back(std::move(all[i]));
   population_.clear();
   front_size_ = 0;
@@ -237,21 +237,21 @@ void Nsga2::take(std::vector<Individual> front) {
   const auto by_birth = [](const Individual& a, const Individual& b) {
     return a.birth_id < b.birth_id;
   };
-  std::sort(front.begin(), front.end(), by_birth);
+  std::ranges::sort(front, by_birth);
   const std::size_t room = size_ - population_.size();
   std::vector<Costs> costs;
   for (const Individual& individual : front) costs.push_back(costs_of(individual.standing));
   std::vector<double> distances = crowding_distances(costs);
   while (front.size() > room) {
-    const auto least = std::min_element(distances.begin(), distances.end()) - distances.begin();
+    const auto least = std::ranges::min_element(distances) - distances.begin();
     front.erase(front.begin() + least);
     costs.erase(costs.begin() + least);
     distances = crowding_distances(costs);
   }
   std::vector<std::size_t> order(front.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return distances[a] > distances[b]; });
+  std::ranges::stable_sort(
+      order, [&](std::size_t a, std::size_t b) { return distances[a] > distances[b]; });
   for (const std::size_t i : order) population_.push_back(std::move(front[i]));
 }
 

@@ -104,7 +104,7 @@ void AutoSearch::learn(std::span<const Genome> proposed, std::span<const Standin
   if (phase_ == kGlobal) {
     global_->learn(proposed, standings);
   } else if (phase_ == kProbing) {
-    const auto least = std::min_element(standings.begin(), standings.end(), better);
+    const auto least = std::ranges::min_element(standings, better);
     descent_.begin(proposed[static_cast<std::size_t>(least - standings.begin())], *least);
     phase_ = kDescending;
   } else {

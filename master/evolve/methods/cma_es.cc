@@ -169,9 +169,8 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
   evaluations_ += proposed.size();
   std::vector<std::size_t> order(proposed.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return better(standings[a], standings[b]);
-  });
+  std::ranges::stable_sort(
+      order, [&](std::size_t a, std::size_t b) { return better(standings[a], standings[b]); });
   Eigen::MatrixXd steps(mean_.size(), static_cast<Eigen::Index>(population()));
   for (Eigen::Index i = 0; i < steps.cols(); ++i) {
     steps.col(i) = (to_vector(proposed[order[static_cast<std::size_t>(i)]]) - mean_) / sigma_;
@@ -189,9 +188,8 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
       static_cast<std::size_t>(10 + std::ceil(30 * n / static_cast<double>(population())));
   if (bests_.size() > span) bests_.erase(bests_.begin());
   const bool flat =
-      bests_.size() == span && *std::max_element(bests_.begin(), bests_.end()) -
-                                       *std::min_element(bests_.begin(), bests_.end()) <=
-                                   kFlatCost;
+      bests_.size() == span &&
+      *std::ranges::max_element(bests_) - *std::ranges::min_element(bests_) <= kFlatCost;
   if (flat || converged()) begin_again();
 }
 
@@ -217,8 +215,7 @@ Eigen::MatrixXd CmaEs::with_others(const Eigen::MatrixXd& steps) const {
     const double unit = whitened.norm() / std::sqrt(static_cast<double>(its.size()));
     if (unit > 0) add(its / unit);
   }
-  std::stable_sort(ranked.begin(), ranked.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::ranges::stable_sort(ranked, [](const auto& a, const auto& b) { return a.first < b.first; });
   Eigen::MatrixXd all(steps.rows(), std::ssize(ranked));
   for (Eigen::Index i = 0; i < all.cols(); ++i) {
     all.col(i) = ranked[static_cast<std::size_t>(i)].second;

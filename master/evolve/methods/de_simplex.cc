@@ -34,7 +34,7 @@ void DeSimplex::learn(std::span<const Genome> proposed, std::span<const Standing
     return;
   }
   // The iteration that ends differential evolution may be one that starts it over with nobody.
-  const auto least = std::min_element(standings.begin(), standings.end(), better);
+  const auto least = std::ranges::min_element(standings, better);
   Individual best;
   best.genome = proposed[static_cast<std::size_t>(least - standings.begin())];
   best.standing = *least;

@@ -29,7 +29,7 @@ DifferentialEvolution::DifferentialEvolution(const MethodSetup& setup)
 std::vector<Genome> DifferentialEvolution::propose(const StreamOf& stream_of) const {
   std::vector<std::size_t> order(population_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
     return better(population_[a].standing, population_[b].standing);
   });
   const auto elite =

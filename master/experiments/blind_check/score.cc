@@ -69,7 +69,7 @@ Judgement judge_effects(const Truth& truth, const Reported& reported) {
   std::vector<ReportedEffect> left = reported.effects;
   // By name first: one name may be another one's alias, and be there beside it.
   const auto hit_by = [&](const TrueEffect& effect, bool by_alias) {
-    return std::find_if(left.begin(), left.end(), [&](const ReportedEffect& one) {
+    return std::ranges::find_if(left, [&](const ReportedEffect& one) {
       return by_alias ? family_of(one).count(effect.name) > 0 : one.name == effect.name;
     });
   };
@@ -166,9 +166,9 @@ Result<Reported> parse_reported(const std::string& text, const std::string& file
 std::optional<bool> missed_below(const Truth& truth, const Reported& reported) {
   std::optional<bool> below;
   for (const TrueEffect& effect : truth.effects) {
-    const bool named = std::any_of(
-        reported.effects.begin(), reported.effects.end(),
-        [&](const ReportedEffect& one) { return family_of(one).count(effect.name) > 0; });
+    const bool named = std::ranges::any_of(reported.effects, [&](const ReportedEffect& one) {
+      return family_of(one).count(effect.name) > 0;
+    });
     const Effect* entry = catalogue_entry(effect.name);
     if (named || !entry || truth.kind == CaseKind::kOutside) continue;
     for (std::size_t i = 0; i < entry->strengths; ++i) {

@@ -220,8 +220,8 @@ std::vector<Truth> by_effect(std::vector<Truth> cases, const ParameterTable& tab
     while (e < table.effects().size() && table.effects()[e].name != effect.name) ++e;
     return std::pair(e, -std::round(10 * effect.size));
   };
-  std::stable_sort(cases.begin(), cases.end(),
-                   [&](const Truth& a, const Truth& b) { return rank(a) < rank(b); });
+  std::ranges::stable_sort(cases,
+                           [&](const Truth& a, const Truth& b) { return rank(a) < rank(b); });
   return cases;
 }
 

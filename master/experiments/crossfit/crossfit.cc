@@ -20,7 +20,7 @@ std::vector<std::string> values_in(const TrialLog& log, const TrialColumnReader&
   std::vector<std::string> values;
   for (const Trial& trial : log.trials) {
     const std::string word = column(trial);
-    if (std::find(values.begin(), values.end(), word) == values.end()) values.push_back(word);
+    if (!contains(values, word)) values.push_back(word);
   }
   return values;
 }
@@ -40,7 +40,7 @@ std::vector<Pose> mean_of_repeats(const TrialLog& log,
   }
   std::vector<Pose> ends;
   for (const auto& key : keys) {
-    const auto n = static_cast<double>(std::count(keys.begin(), keys.end(), key));
+    const auto n = static_cast<double>(std::ranges::count(keys, key));
     const Eigen::Vector4d mean = sums.at(key) / n;
     ends.push_back({mean[0], mean[1], std::atan2(mean[3], mean[2])});
   }

@@ -92,11 +92,8 @@ class ConstantVelocityMover final : public Mover {
   Result<std::vector<Leg>> drive(std::span<const Start> starts) const override {
     std::vector<Leg> legs;
     for (const Start& start : starts) {
-      const auto model = std::find_if(models_.begin(), models_.end(), [&](const auto& m) {
-        const CommandSpec& c = m.command;
-        return c.name == start.command.name && c.left == start.command.left &&
-               c.right == start.command.right;
-      });
+      const auto model = std::ranges::find_if(
+          models_, [&](const auto& m) { return same_duties(m.command, start.command); });
       if (model == models_.end()) return unknown(start.command, "the constant-velocity model");
       const double t = start.command.duration_s;
       const Pose X_SE = exp({model->speed_m_s * t, 0, model->turn_rad_s * t});

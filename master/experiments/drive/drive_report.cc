@@ -270,7 +270,7 @@ PathBand PathBand::fit(std::span<const DrivenRun> runs, double coverage, unsigne
   }
   std::vector<double> excursions;
   for (const auto& path : judging) excursions.push_back(excursion_of(band.points_, path));
-  std::sort(excursions.begin(), excursions.end());
+  std::ranges::sort(excursions);
   const auto n = static_cast<double>(excursions.size());
   const double rank = std::clamp(std::ceil((n + 1) * coverage), 1.0, n);
   const double factor = excursions[static_cast<std::size_t>(rank) - 1];

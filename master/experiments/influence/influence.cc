@@ -38,11 +38,12 @@ class InfluenceStudy {
     RETURN_IF_ERROR(standard());
     RETURN_IF_ERROR(one_at_a_time());
     RETURN_IF_ERROR(morris());
-    std::stable_sort(report_.factors.begin(), report_.factors.end(),
-                     [](const FactorInfluence& a, const FactorInfluence& b) {
-                       if (a.alone.influential != b.alone.influential) return a.alone.influential;
-                       return a.alone.distance > b.alone.distance;
-                     });
+    std::ranges::stable_sort(report_.factors,
+                             [](const FactorInfluence& a, const FactorInfluence& b) {
+                               if (a.alone.influential != b.alone.influential)
+                                 return a.alone.influential;
+                               return a.alone.distance > b.alone.distance;
+                             });
     return report_;
   }
 
@@ -129,7 +130,7 @@ class InfluenceStudy {
     for (std::size_t k = 0; k < count; ++k) {
       const double g = count == 1 ? 0 : static_cast<double>(k) / static_cast<double>(count - 1);
       const double value = decode_gene(problem_.table(), gene, g);
-      const bool known = std::find(levels.begin(), levels.end(), value) != levels.end();
+      const bool known = contains(levels, value);
       if (!known && value != problem_.values[gene.row]) levels.push_back(value);
     }
     return levels;

@@ -47,8 +47,8 @@ std::vector<ChartBar> bars_of(const InfluenceReport& report, const ParameterTabl
                     std::min(interval.upper, 1e5),
                     morris ? factor.morris.influential : factor.alone.influential});
   }
-  std::stable_sort(bars.begin(), bars.end(),
-                   [](const ChartBar& a, const ChartBar& b) { return a.value > b.value; });
+  std::ranges::stable_sort(bars,
+                           [](const ChartBar& a, const ChartBar& b) { return a.value > b.value; });
   return bars;
 }
 

@@ -86,7 +86,7 @@ Status Designer::choose_effects(DesignedPlan* plan) {
   std::vector<std::string> known;
   for (const Effect& effect : catalogue) known.push_back(effect.name);
   for (const std::string& name : settings_.effects.empty() ? known : settings_.effects) {
-    const auto found = std::find(known.begin(), known.end(), name);
+    const auto found = std::ranges::find(known, name);
     if (found == known.end()) {
       return Error{"there is no effect '" + name + "'" + suggestion(name, known)};
     }
@@ -102,7 +102,7 @@ Status Designer::choose_effects(DesignedPlan* plan) {
         "none of these effects moves where a trial ends, so no plan shows them better than "
         "another; name others with --effects"};
   }
-  std::sort(effects_.begin(), effects_.end());
+  std::ranges::sort(effects_);
   effects_.erase(std::unique(effects_.begin(), effects_.end()), effects_.end());
   return {};
 }
@@ -229,8 +229,8 @@ std::vector<PowerPoint> Designer::power(const Signals& planned, const TrialLog& 
 void keep_common(std::vector<Visibility>* a, std::vector<Visibility>* b) {
   const auto lacks = [](const std::vector<Visibility>& all) {
     return [&all](const Visibility& v) {
-      return std::none_of(all.begin(), all.end(),
-                          [&](const Visibility& other) { return other.effect == v.effect; });
+      return std::ranges::none_of(
+          all, [&](const Visibility& other) { return other.effect == v.effect; });
     };
   };
   std::erase_if(*a, lacks(*b));
@@ -279,8 +279,7 @@ Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSet
   keep_common(&plan.seen, &plan.seen_at_random);
   for (const std::size_t effect : designer.effects()) {
     const std::string& name = config.problem.table().effects()[effect].name;
-    if (std::none_of(plan.seen.begin(), plan.seen.end(),
-                     [&](const Visibility& v) { return v.effect == name; })) {
+    if (std::ranges::none_of(plan.seen, [&](const Visibility& v) { return v.effect == name; })) {
       plan.without_shift.push_back(name);
     }
   }

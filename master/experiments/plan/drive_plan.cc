@@ -90,9 +90,7 @@ class Planner {
     }
     for (const Wanted& wanted : settings_.wanted) wanted_.push_back(wanted);
     for (const Wanted& wanted : wanted_) {
-      const auto found = std::find_if(rows_.begin(), rows_.end(), [&](const KinematicRow& row) {
-        return row.name == wanted.name;
-      });
+      const auto found = std::ranges::find(rows_, wanted.name, &KinematicRow::name);
       if (found == rows_.end()) {
         return Error{"this robot has no value \"" + wanted.name + "\", expected one of " +
                      joined(rows_, ", ", &KinematicRow::name)};
@@ -163,7 +161,7 @@ class Planner {
 
   bool stays_on_floor(const Path& path) const {
     Pose X = X_WM_;
-    return std::all_of(path.at.begin(), path.at.end(), [&](const Pose& step) {
+    return std::ranges::all_of(path.at, [&](const Pose& step) {
       X = X * step;
       return std::abs(X.x) <= settings_.length_m / 2 && std::abs(X.y) <= settings_.width_m / 2;
     });
@@ -308,7 +306,7 @@ std::optional<double> seconds_until(const DrivePlan& plan, const std::vector<Wan
   const auto spread = [&](const Eigen::VectorXd& widths) {
     double sum = 0;
     for (std::size_t k = 0; k < plan.rows.size(); ++k) {
-      const bool of_it = wanted.empty() || std::any_of(wanted.begin(), wanted.end(), [&](auto& w) {
+      const bool of_it = wanted.empty() || std::ranges::any_of(wanted, [&](auto& w) {
                            return w.name == plan.rows[k].name;
                          });
       if (of_it) sum += std::log(std::max(widths[static_cast<Eigen::Index>(k)], 1e-12));

@@ -228,7 +228,7 @@ double mean_power(const Problem& problem, const Signals& signals,
   double sum = 0;
   std::size_t count = 0;
   for (const auto& [effect, shifts] : by_effect(signals)) {
-    const auto wanted = std::find_if(at.begin(), at.end(), [&, name = effect](const Visibility& v) {
+    const auto wanted = std::ranges::find_if(at, [&, name = effect](const Visibility& v) {
       return v.effect == problem.table().effects()[name].name;
     });
     if (wanted == at.end() || wanted->strength > 1) continue;

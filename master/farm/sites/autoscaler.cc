@@ -21,7 +21,7 @@ std::vector<std::string> dismissed(std::vector<FleetJob> jobs, std::size_t surpl
     return job.state == JobState::kLeaving ||
            (job.state == JobState::kRunning && job.joined && !job.idle);
   });
-  std::stable_sort(jobs.begin(), jobs.end(), [](const FleetJob& a, const FleetJob& b) {
+  std::ranges::stable_sort(jobs, [](const FleetJob& a, const FleetJob& b) {
     if (a.state != b.state) return a.state == JobState::kQueued;
     return a.since_s > b.since_s;
   });

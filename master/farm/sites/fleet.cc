@@ -190,7 +190,7 @@ void Fleet::cancel_some(const std::vector<Known*>& some) {
   const auto command = expand(options_.site.cancel, named);
   const auto captured = run_(command, "");
   const bool done = captured && captured->succeeded();
-  const bool again = std::any_of(some.begin(), some.end(), [](Known* one) { return one->refused; });
+  const bool again = std::ranges::any_of(some, [](Known* one) { return one->refused; });
   for (Known* known : some) known->refused = !done;
   // One that has ended meanwhile makes it fail, too: the next look has those that still stand.
   if (done || !again) return;
@@ -204,11 +204,9 @@ std::string Fleet::free_host(const std::vector<std::string>& avoided) const {
   std::size_t fewest =
       site.jobs_per_host > 0 ? site.jobs_per_host : std::numeric_limits<std::size_t>::max();
   for (const std::string& host : site.hosts) {
-    if (std::find(avoided.begin(), avoided.end(), host) != avoided.end()) continue;
-    const auto jobs =
-        static_cast<std::size_t>(std::count_if(known_.begin(), known_.end(), [&](const auto& one) {
-          return one.second.job.node == host;
-        }));
+    if (contains(avoided, host)) continue;
+    const auto jobs = static_cast<std::size_t>(std::ranges::count_if(
+        known_, [&](const auto& one) { return one.second.job.node == host; }));
     if (jobs >= fewest) continue;
     fewest = jobs;
     best = host;

@@ -26,7 +26,7 @@ void read_pattern(TomlSection& section, const char* key, std::string* to) {
 
 // Whether one of `states` is `state`.
 bool among(const std::vector<std::string>& states, const std::string& state) {
-  return std::find(states.begin(), states.end(), state) != states.end();
+  return contains(states, state);
 }
 
 }  // namespace

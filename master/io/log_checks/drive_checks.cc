@@ -80,7 +80,7 @@ struct Rate {
 Rate best_rate(const std::vector<DriveSample>& turns, double sign) {
   std::vector<double> sizes;
   for (const DriveSample& s : turns) sizes.push_back(std::abs(s.turn_s));
-  const double largest = *std::max_element(sizes.begin(), sizes.end());
+  const double largest = *std::ranges::max_element(sizes);
   const double fastest = 2 * kPi / median(sizes);
   const double step = 0.05 / largest;
   Rate best;

@@ -121,7 +121,7 @@ class MapReader {
       read_column(*section, role, node, map);
     }
     // TOML's tables are sorted by name; channels keep the file's order.
-    std::sort(places_.begin(), places_.end());
+    std::ranges::sort(places_);
     std::vector<MappedColumn> ordered;
     for (const auto& [line, column, i] : places_) ordered.push_back(map.columns[i]);
     map.columns = std::move(ordered);
@@ -151,8 +151,8 @@ class MapReader {
           " has no t, expected the column of the times (or dt, of the seconds since the row "
           "before)");
     }
-    const bool counts = std::any_of(map.columns.begin(), map.columns.end(),
-                                    [](const MappedColumn& c) { return c.rate; });
+    const bool counts =
+        std::ranges::any_of(map.columns, [](const MappedColumn& c) { return c.rate; });
     if (map.intervals && counts) {
       refuse(
           " has dt and a column with rate = true, expected increment = true with what the count "

@@ -89,7 +89,7 @@ std::uint16_t McapWriter::add_channel(const std::string& topic, const std::strin
                                       const std::string& schema) {
   assert(channels_.size() < std::numeric_limits<U16>::max());
   const std::pair wanted(schema_name, schema);
-  const auto found = std::find(schemas_.begin(), schemas_.end(), wanted);
+  const auto found = std::ranges::find(schemas_, wanted);
   const auto id = static_cast<U16>(found - schemas_.begin() + 1);  // 0 would be none
   if (found == schemas_.end()) schemas_.push_back(wanted);
   channels_.push_back({topic, id});
@@ -120,8 +120,8 @@ std::string McapWriter::channel_records() const {
 }
 
 std::string McapWriter::finish() {
-  std::stable_sort(messages_.begin(), messages_.end(),
-                   [](const Message& a, const Message& b) { return a.time_ns < b.time_ns; });
+  std::ranges::stable_sort(
+      messages_, [](const Message& a, const Message& b) { return a.time_ns < b.time_ns; });
   std::string file(kMcapMagic), chunk_rows;
   file += written(kWrittenHeader, sized("") + sized("gapfarm"));
   U32 chunks = 0;

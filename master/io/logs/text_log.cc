@@ -253,7 +253,7 @@ Result<std::vector<std::string>> column_names(const TableHead& head, const std::
   for (const CsvField& field : head.names) {
     std::string name = field.text;
     if (name.empty()) name = "column_" + std::to_string(names.size() + 1);
-    if (std::find(names.begin(), names.end(), name) != names.end()) {
+    if (contains(names, name)) {
       return text_error(file, field.place, "column " + quoted_word(name) + " again",
                         "each column once", "rename or remove one of the two");
     }
@@ -336,7 +336,7 @@ bool looks_like_tum(std::string_view text) {
   const std::string_view line = first_line(text);
   if (line.find(',') != line.npos) return false;
   const auto tokens = tokens_of(line);
-  return tokens.size() == 8 && std::all_of(tokens.begin(), tokens.end(), [](std::string_view word) {
+  return tokens.size() == 8 && std::ranges::all_of(tokens, [](std::string_view word) {
            return parse_double(word).has_value();
          });
 }
@@ -385,15 +385,14 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
   const CsvRow& first = rows.front();
   if (first.fields[0].text == "Format Version") return parse_motive(rows, file);
   const auto named = [&](std::string_view name) {
-    return std::any_of(first.fields.begin(), first.fields.end(),
-                       [&](const CsvField& f) { return f.text == name; });
+    return std::ranges::any_of(first.fields, [&](const CsvField& f) { return f.text == name; });
   };
   if (format == TextFormat::kTrialLog && named("x0") && named("theta1")) {
     return wrong_format(file, format, "a log of drives");
   }
-  const bool headed =
-      std::none_of(first.fields.begin(), first.fields.end(),
-                   [&](const CsvField& f) { return parse_decimal(f.text, separator).has_value(); });
+  const bool headed = std::ranges::none_of(first.fields, [&](const CsvField& f) {
+    return parse_decimal(f.text, separator).has_value();
+  });
   return headed ? parse_headed(std::move(rows), file, separator)
                 : parse_echo(rows, file, separator);
 }

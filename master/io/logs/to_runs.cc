@@ -86,8 +86,8 @@ class Importer {
   }
 
   static bool has_all(const LogTable& table, const TableMap& map) {
-    return std::all_of(map.columns.begin(), map.columns.end(),
-                       [&](const MappedColumn& c) { return table.find(c.column).has_value(); });
+    return std::ranges::all_of(
+        map.columns, [&](const MappedColumn& c) { return table.find(c.column).has_value(); });
   }
 
   static bool has_number(const LogTable& table, const std::string& column) {
@@ -177,8 +177,8 @@ class Importer {
         values.push_back(lines[c].slope * count + lines[c].offset);
         if (std::isfinite(count)) counts[c] = count;
       }
-      const bool whole = std::all_of(values.begin(), values.end(),
-                                     [](double v) { return std::abs(v) < kGreatest; });
+      const bool whole =
+          std::ranges::all_of(values, [](double v) { return std::abs(v) < kGreatest; });
       if (!whole || (poses && !to_pose(map, values))) {
         if (map.increments || map.intervals) return broken_chain(table, r, kind.name);
         ++tally.blank;
@@ -285,7 +285,7 @@ class Importer {
             add(kind, stretch, runs[run], order, run);
         }
       }
-      std::sort(order.begin(), order.end(), [&](const auto& a, const auto& b) {
+      std::ranges::sort(order, [&](const auto& a, const auto& b) {
         const double ta = first_time(runs[a]), tb = first_time(runs[b]);
         const auto na = parse_double(a), nb = parse_double(b);
         return na && nb && *na != *nb ? *na < *nb : ta < tb;
@@ -314,7 +314,7 @@ class Importer {
 
   static void add(const Kind& kind, const Stretch& stretch, LoggedRun& run,
                   std::vector<std::string>& order, const std::string& name) {
-    if (std::find(order.begin(), order.end(), name) == order.end()) order.push_back(name);
+    if (!contains(order, name)) order.push_back(name);
     const std::string_view what = kind.name;
     const bool increments = what == "poses" && kind.map->increments;
     if (increments && kind.map->intervals) run.poses.push_back({0, {}});

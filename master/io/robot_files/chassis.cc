@@ -271,9 +271,9 @@ class Finder {
 
   void find_supports() {
     for (const UrdfLink& link : model_.links) {
-      const bool wheel = std::any_of(
-          chassis_.wheels.begin(), chassis_.wheels.end(),
-          [&](const ChassisWheel& w) { return w.link == &link || hangs_on_caster(link, w); });
+      const bool wheel = std::ranges::any_of(chassis_.wheels, [&](const ChassisWheel& w) {
+        return w.link == &link || hangs_on_caster(link, w);
+      });
       if (wheel) continue;
       const UrdfJoint* above = model_.joint_above(link.name);
       if (above != nullptr && above->type != "fixed") continue;
@@ -326,8 +326,8 @@ bool contains_any(std::string_view text, std::initializer_list<std::string_view>
   std::string lower(text);
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::any_of(needles.begin(), needles.end(),
-                     [&](std::string_view word) { return lower.find(word) != lower.npos; });
+  return std::ranges::any_of(needles,
+                             [&](std::string_view word) { return lower.find(word) != lower.npos; });
 }
 
 Result<Chassis> find_chassis(const UrdfModel& model, const std::vector<DriveFacts>& facts) {

@@ -138,8 +138,8 @@ class Comparison {
   }
 
   bool turns(const std::string& joint) const {
-    return std::any_of(reading_.sources.begin(), reading_.sources.end(),
-                       [&](const WheelSource& source) { return source.turning == joint; });
+    return std::ranges::any_of(reading_.sources,
+                               [&](const WheelSource& source) { return source.turning == joint; });
   }
 
   // Two controllers or plugins on one thing.

@@ -265,7 +265,7 @@ class YamlReader {
     std::vector<Entry> entries;
     flatten(parameters_of(node), "", 0, entries);
     for (const Entry& entry : entries) take_fact(facts, entry.key, entry.values, entry.line);
-    const bool sizes = std::any_of(facts.numbers.begin(), facts.numbers.end(), [](const auto& n) {
+    const bool sizes = std::ranges::any_of(facts.numbers, [](const auto& n) {
       return n.first == "wheel_separation" || n.first == "wheelbase" || n.first == "lx_plus_ly" ||
              n.first == "wheel_radius" || n.first == "robot_radius";
     });

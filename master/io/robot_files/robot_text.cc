@@ -52,7 +52,7 @@ std::string toml_key(const std::string& key) {
   const auto bare = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '.';
   };
-  return std::all_of(key.begin(), key.end(), bare) ? key : "\"" + key + "\"";
+  return std::ranges::all_of(key, bare) ? key : "\"" + key + "\"";
 }
 
 // The sections [genes], [optimiser] and [evolution].
@@ -222,8 +222,8 @@ std::string describe_robot(const RobotReading& reading, const GroundRobot& compl
     text += "\n";
   }
   text += wheel_table(reading, completed);
-  const bool stated = std::any_of(reading.sources.begin(), reading.sources.end(),
-                                  [](const WheelSource& source) { return source.mu1.has_value(); });
+  const bool stated = std::ranges::any_of(
+      reading.sources, [](const WheelSource& source) { return source.mu1.has_value(); });
   if (stated) {
     text += "floor: friction " + number(completed.friction) + " along the wheels, " +
             number(completed.friction_ratio) + " times that across (Gazebo's mu1, mu2)\n";

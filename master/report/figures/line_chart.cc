@@ -213,7 +213,7 @@ std::string fitness_chart(const std::vector<FitnessPoint>& points, const std::st
   best.upper = best.line;
   if (!medians.empty()) {
     // Toward the bad side: nine tenths of the medians.
-    std::sort(medians.begin(), medians.end());
+    std::ranges::sort(medians);
     const std::size_t tenth = medians.size() / 10;
     if (higher_is_better) {
       chart.y_least = medians[tenth];

@@ -108,7 +108,7 @@ struct Range {
 // The bulk of `values`: their quartiles' range, widened by twice itself on both sides, but no
 // farther than the values go.
 Range bulk(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const double q1 = values[values.size() / 4], q3 = values[values.size() * 3 / 4];
   const double reach = 2 * (q3 - q1) + 5;
   return {std::max(values.front(), q1 - reach), std::min(values.back(), q3 + reach)};

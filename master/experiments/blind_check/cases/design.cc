@@ -70,7 +70,7 @@ std::vector<std::size_t> chosen_effects(const ParameterTable& table,
     if (table.effects()[e].repeats.empty()) chosen.push_back(e);
   }
   for (const std::string& name : names) {
-    const auto found = std::find(known.begin(), known.end(), name);
+    const auto found = std::ranges::find(known, name);
     chosen.push_back(static_cast<std::size_t>(found - known.begin()));
   }
   return chosen;
@@ -284,7 +284,7 @@ Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::ve
 Status check_effects(const ParameterTable& table, const std::vector<std::string>& names) {
   const std::vector<std::string> known = effect_names(table);
   for (const std::string& name : names) {
-    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    if (contains(known, name)) continue;
     return Error{"unknown effect '" + name + "'" + suggestion(name, known)};
   }
   return {};

@@ -35,7 +35,7 @@ std::optional<double> parameter_value(const std::string& effect, const std::stri
   const Effect* entry = catalogue_entry(effect);
   if (entry == nullptr) return std::nullopt;
   for (const Parameter& p : entry->parameters) {
-    const auto word = std::find(p.choices.begin(), p.choices.end(), value.get<std::string>());
+    const auto word = std::ranges::find(p.choices, value.get<std::string>());
     if (p.key == key && word != p.choices.end()) {
       return static_cast<double>(word - p.choices.begin());
     }

@@ -120,7 +120,7 @@ double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Ve
 
 // Andrew's monotone chain.
 std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
-  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
+  std::ranges::sort(points, [](const auto& a, const auto& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
   });
   if (points.size() < 3) return points;
@@ -134,7 +134,7 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
       hull.push_back(point);
     }
     hull.pop_back();
-    std::reverse(points.begin(), points.end());
+    std::ranges::reverse(points);
   }
   return hull;
 }
