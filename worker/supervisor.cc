@@ -13,8 +13,20 @@
 namespace gapfarm {
 namespace {
 
-// By EndCause; of one that was stuck its work is not to blame.
-constexpr const char* kEndNames[] = {"left", "killed", "crashed", "left", "hung"};
+const char* word(EndCause cause) {
+  switch (cause) {
+    case EndCause::kCrashed:
+      return "crashed";
+    case EndCause::kHung:
+      return "hung";
+    case EndCause::kKilled:
+      return "killed";
+    case EndCause::kStuck:
+    case EndCause::kLeft:
+      break;
+  }
+  return "left";
+}
 
 ProcessPoolOptions pool_options(const SupervisorOptions& options) {
   ProcessPoolOptions pool;
@@ -34,9 +46,8 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
     if (name.rfind(prefix + "-1.", 0) == 0) all.push_back("--announce");
     if (replaced != nullptr) {
       all.insert(all.end(),
-                 {"--replaces", replaced->name, "--replaced-end",
-                  kEndNames[static_cast<std::size_t>(replaced->cause)], "--replaced-epoch",
-                  std::to_string(replaced->epoch), "--replaced-attempt",
+                 {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
+                  "--replaced-epoch", std::to_string(replaced->epoch), "--replaced-attempt",
                   std::to_string(replaced->attempt), "--replaced-failure", replaced->failure});
     }
     if (std::isfinite(deadline)) {

@@ -10,8 +10,17 @@ namespace {
 // Equal parts of the amounts, each a way of its own: arcs bend within what a side may lose or a
 // heading may be off.
 int parts_of(OutlierKind kind) {
-  constexpr int kParts[] = {5, 2, 10, 2};
-  return kParts[static_cast<std::size_t>(kind)];
+  switch (kind) {
+    case OutlierKind::kSide:
+      return 5;
+    case OutlierKind::kLate:
+      return 2;
+    case OutlierKind::kTurned:
+      return 10;
+    case OutlierKind::kShifted:
+      return 2;
+  }
+  return 1;
 }
 
 bool has_two_cases(OutlierKind kind) {
