@@ -24,7 +24,9 @@ constexpr double kEdge_m = 0.02;
 class Body {
  public:
   Body(const GroundRobot& robot, const Kinematics& at)
-      : robot_(robot), load_(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0)) {
+      : robot_(robot),
+        load_(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0)),
+        reach_m_(wheel_reach_m(robot)) {
     for (std::size_t i = 0; i < at.names.size(); ++i) {
       put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
     }
@@ -210,7 +212,7 @@ class Body {
   Twist on_slope(std::span<const WheelMotion> wheels, const Twist& v, double heading_rad) const {
     const Eigen::Vector2d down = Eigen::Rotation2Dd(-heading_rad) * downhill_;
     if (skids(robot_)) {
-      const double dragged = std::abs(v[2]) * wheel_reach_m(robot_);
+      const double dragged = std::abs(v[2]) * reach_m_;
       return {dragged * down[0], dragged * down[1], 0};
     }
     if (is_steered(robot_)) return {std::abs(v[0]) * down[0], 0, 0};
@@ -269,7 +271,8 @@ class Body {
   double sag_ = 0, drift_ = 0, rate_ = 0, scale_ = 1, aspect_ = 1;
   double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
   Eigen::Vector2d downhill_ = Eigen::Vector2d::Zero();  // in the tracker's frame
-  std::optional<double> grip_m_s2_;                     // none: no speed slips
+  double reach_m_;
+  std::optional<double> grip_m_s2_;  // none: no speed slips
   double slip_angle_rad_ = 0;
   double grip_shape_ = 2;
   std::optional<OmniWheels> omni_;
@@ -321,11 +324,6 @@ void Kinematics::add(std::string name, double value) {
 Eigen::Index Kinematics::index(std::string_view name) const {
   const auto found = std::ranges::find(names, name);
   return found == names.end() ? -1 : found - names.begin();
-}
-
-double Kinematics::value_or(std::string_view name, double otherwise) const {
-  const Eigen::Index at = index(name);
-  return at < 0 ? otherwise : values[at];
 }
 
 Kinematics nominal_kinematics(const GroundRobot& robot) {

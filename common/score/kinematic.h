@@ -23,7 +23,10 @@ struct Kinematics {
   void add(std::string name, double value);
   // Where a name stands; -1: nowhere.
   Eigen::Index index(std::string_view name) const;
-  double value_or(std::string_view name, double otherwise) const;
+  double value_or(std::string_view name, double otherwise) const {
+    const Eigen::Index at = index(name);
+    return at < 0 ? otherwise : values[at];
+  }
 };
 
 // Whether a value slows down by its size, whatever its sign (lags and drags): fits keep it at 0 or

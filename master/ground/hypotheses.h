@@ -2,6 +2,7 @@
 // diagnosis (docs/ground.md).
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -24,6 +25,10 @@ struct KinematicRow {
   double farthest = 0;    // how far off nominal it may be where it is asked for; 0: anywhere
 };
 
+struct NamedEffect;
+class WindowFitter;
+struct WindowFit;
+
 struct GroundHypothesis {
   std::string name;
   std::vector<std::string> aliases;  // other words for what logs cannot distinguish
@@ -37,6 +42,9 @@ struct GroundHypothesis {
   double price = 0;        // nats that it must gain more, having more values than others
   bool of_world = false;   // acts in a place or along an axis of the world
   double radians = 1;      // logged headings times this are radians
+  // Parameters and text of the named effect; empty: its values' own.
+  std::function<void(const WindowFitter&, const WindowFit&, std::uint64_t seed, NamedEffect*)>
+      describe = {};
 };
 
 // Standard deviation of a value that is wrong (kPlausibleErrors).

@@ -62,6 +62,61 @@ bool parts_windows(const WindowFitter& fitter, const WindowFit& fit) {
   return std::min(share, 1 - share) > kLeastSide;
 }
 
+// Parameters and text of a named edge: how much less far wheels travel on the slower side, where
+// the line passes nearest to the middle of the log, and which side is slower.
+void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
+                         NamedEffect* effect) {
+  const EdgeRows at = edge_rows(fit.rows);
+  const std::vector<Trial>& trials = fitter.windows().trials;
+  Pose middle;
+  for (const Trial& trial : trials) {
+    middle.x += trial.X_WS.x / static_cast<double>(trials.size());
+    middle.y += trial.X_WS.y / static_cast<double>(trials.size());
+  }
+  // The normal points to the slower side.
+  const bool slower_beyond = fit.values[at.ratio] < 1;
+  const double turn = slower_beyond ? 0 : std::numbers::pi;
+  const double angle = wrap_angle(fit.values[at.angle] + turn);
+  const auto change_of = [&](double ratio) { return (slower_beyond ? ratio : 1 / ratio) - 1; };
+  const auto offset_of = [&](double a, double offset) {
+    return (slower_beyond ? 1 : -1) * (offset - along_normal(middle, a));
+  };
+  const auto line_of = [&](const Eigen::VectorXd& v) {
+    return Eigen::Vector3d(change_of(v[at.ratio]), offset_of(v[at.angle], v[at.offset]),
+                           angle + wrap_angle(v[at.angle] + turn - angle));
+  };
+  // Slopes at the line know the windows over it alone: what moves it more is that others are.
+  const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
+  Eigen::Matrix3Xd parts(3, kFolds);
+  for (int k = 0; k < kFolds; ++k) parts.col(k) = line_of(folds[k].values);
+  const Eigen::Vector3d line = line_of(fit.values), deviation = jackknife_deviation(parts);
+  const Eigen::MatrixXd draws = fitter.draws(fit, seed);
+  const auto estimate = [&](const char* key, Eigen::Index row, const char* unit) {
+    std::vector<double> drawn;
+    for (const auto& values : draws.colwise()) drawn.push_back(line_of(values)[row]);
+    return widened_estimate(key, line[row], std::move(drawn), deviation[row], unit);
+  };
+  const Estimate ratio = estimate("ratio", 0, "-");
+  const Estimate offset = estimate("offset", 1, "m");
+  const Estimate normal = estimate("angle", 2, "rad");
+  // The interval of the line's place is across it.
+  const auto place = [&](const char* key, double from, double part) {
+    const double ends[] = {from + offset.lo * part, from + offset.hi * part};
+    return Estimate{key, from + offset.value * part, std::min(ends[0], ends[1]),
+                    std::max(ends[0], ends[1]), "m"};
+  };
+  const Estimate x = place("x", middle.x, std::cos(angle));
+  const Estimate y = place("y", middle.y, std::sin(angle));
+  effect->parameters = {ratio, x, y, normal};
+  effect->text = fmt::format(
+      "The robot drives over an edge between two floors: its wheels travel {:.0f} % [{:.0f}, "
+      "{:.0f}] less far beyond a line through x {:.3f} m [{:.3f}, {:.3f}], y {:.3f} m [{:.3f}, "
+      "{:.3f}] of the tracker's frame; the slower side lies towards {:.0f} degrees [{:.0f}, "
+      "{:.0f}] from its x axis.",
+      -100 * ratio.value, -100 * ratio.hi, -100 * ratio.lo, x.value, x.lo, x.hi, y.value, y.lo,
+      y.hi, normal.value / kDegree, normal.lo / kDegree, normal.hi / kDegree);
+}
+
 }  // namespace
 
 GroundHypothesis floor_edge() {
@@ -74,6 +129,7 @@ GroundHypothesis floor_edge() {
                 {"edge_ratio", 1, 0.02, "ratio", "-"}};
   edge.price = kPriceOfAnEdge;
   edge.of_world = true;
+  edge.describe = describe_floor_edge;
   return edge;
 }
 
@@ -132,59 +188,6 @@ double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
         std::min(gain, fitter.within_runs(with).objective - fitter.within_runs(without).objective);
   }
   return gain - hypothesis.price;
-}
-
-void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
-                         NamedEffect* effect) {
-  const EdgeRows at = edge_rows(fit.rows);
-  const std::vector<Trial>& trials = fitter.windows().trials;
-  Pose middle;
-  for (const Trial& trial : trials) {
-    middle.x += trial.X_WS.x / static_cast<double>(trials.size());
-    middle.y += trial.X_WS.y / static_cast<double>(trials.size());
-  }
-  // The normal points to the slower side.
-  const bool slower_beyond = fit.values[at.ratio] < 1;
-  const double turn = slower_beyond ? 0 : std::numbers::pi;
-  const double angle = wrap_angle(fit.values[at.angle] + turn);
-  const auto change_of = [&](double ratio) { return (slower_beyond ? ratio : 1 / ratio) - 1; };
-  const auto offset_of = [&](double a, double offset) {
-    return (slower_beyond ? 1 : -1) * (offset - along_normal(middle, a));
-  };
-  const auto line_of = [&](const Eigen::VectorXd& v) {
-    return Eigen::Vector3d(change_of(v[at.ratio]), offset_of(v[at.angle], v[at.offset]),
-                           angle + wrap_angle(v[at.angle] + turn - angle));
-  };
-  // Slopes at the line know the windows over it alone: what moves it more is that others are.
-  const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
-  Eigen::Matrix3Xd parts(3, kFolds);
-  for (int k = 0; k < kFolds; ++k) parts.col(k) = line_of(folds[k].values);
-  const Eigen::Vector3d line = line_of(fit.values), deviation = jackknife_deviation(parts);
-  const Eigen::MatrixXd draws = fitter.draws(fit, seed);
-  const auto estimate = [&](const char* key, Eigen::Index row, const char* unit) {
-    std::vector<double> drawn;
-    for (const auto& values : draws.colwise()) drawn.push_back(line_of(values)[row]);
-    return widened_estimate(key, line[row], std::move(drawn), deviation[row], unit);
-  };
-  const Estimate ratio = estimate("ratio", 0, "-");
-  const Estimate offset = estimate("offset", 1, "m");
-  const Estimate normal = estimate("angle", 2, "rad");
-  // The interval of the line's place is across it.
-  const auto place = [&](const char* key, double from, double part) {
-    const double ends[] = {from + offset.lo * part, from + offset.hi * part};
-    return Estimate{key, from + offset.value * part, std::min(ends[0], ends[1]),
-                    std::max(ends[0], ends[1]), "m"};
-  };
-  const Estimate x = place("x", middle.x, std::cos(angle));
-  const Estimate y = place("y", middle.y, std::sin(angle));
-  effect->parameters = {ratio, x, y, normal};
-  effect->text = fmt::format(
-      "The robot drives over an edge between two floors: its wheels travel {:.0f} % [{:.0f}, "
-      "{:.0f}] less far beyond a line through x {:.3f} m [{:.3f}, {:.3f}], y {:.3f} m [{:.3f}, "
-      "{:.3f}] of the tracker's frame; the slower side lies towards {:.0f} degrees [{:.0f}, "
-      "{:.0f}] from its x axis.",
-      -100 * ratio.value, -100 * ratio.hi, -100 * ratio.lo, x.value, x.lo, x.hi, y.value, y.lo,
-      y.hi, normal.value / kDegree, normal.lo / kDegree, normal.hi / kDegree);
 }
 
 }  // namespace gapfarm

@@ -3,10 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <vector>
 
-#include "master/diagnose/result/diagnosis.h"
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/hypotheses.h"
 
@@ -27,10 +25,5 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
 // line are the fast ones.
 double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
                const WindowFit& with, const WindowFit& without);
-
-// Parameters and text of a named edge: how much less far wheels travel on the slower side, where
-// the line passes nearest to the middle of the log, and which side is slower.
-void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
-                         NamedEffect* effect);
 
 }  // namespace gapfarm

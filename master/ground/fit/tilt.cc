@@ -12,17 +12,9 @@
 
 namespace gapfarm {
 
-GroundHypothesis floor_tilt() {
-  GroundHypothesis tilt;
-  tilt.name = kFloorTilt;
-  tilt.thing = "the floor's slope";
-  tilt.freed = {{"downhill_x", 0, kDownhillShare, "x", "-"},
-                {"downhill_y", 0, kDownhillShare, "y", "-"}};
-  tilt.price = kPriceOfAValue;
-  tilt.of_world = true;
-  return tilt;
-}
+namespace {
 
+// How much farther the robot goes downhill, and where that is.
 void describe_floor_tilt(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
                          NamedEffect* effect) {
   const Eigen::Index x = row_index(fit.rows, "downhill_x"), y = row_index(fit.rows, "downhill_y");
@@ -62,6 +54,20 @@ void describe_floor_tilt(const WindowFitter& fitter, const WindowFit& fit, std::
       skids(fitter.robot())
           ? "turns slide that way by " + farther + " of how far they drag the wheels"
           : "that way the robot goes " + farther + " farther than its wheels roll");
+}
+
+}  // namespace
+
+GroundHypothesis floor_tilt() {
+  GroundHypothesis tilt;
+  tilt.name = "floor_tilt";
+  tilt.thing = "the floor's slope";
+  tilt.freed = {{"downhill_x", 0, kDownhillShare, "x", "-"},
+                {"downhill_y", 0, kDownhillShare, "y", "-"}};
+  tilt.price = kPriceOfAValue;
+  tilt.of_world = true;
+  tilt.describe = describe_floor_tilt;
+  return tilt;
 }
 
 }  // namespace gapfarm

@@ -9,8 +9,6 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
-#include "master/ground/fit/edge.h"
-#include "master/ground/fit/tilt.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 
@@ -110,8 +108,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
   effect.text = search_.reference ? text_of_change(robot_, h, effect) + "."
                                   : text_of_value(robot_, h, effect);
-  if (h.name == kFloorEdge) describe_floor_edge(fitter_, search_.fit, options_.seed, &effect);
-  if (h.name == kFloorTilt) describe_floor_tilt(fitter_, search_.fit, options_.seed, &effect);
+  if (h.describe) h.describe(fitter_, search_.fit, options_.seed, &effect);
   return effect;
 }
 

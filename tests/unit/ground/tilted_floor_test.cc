@@ -2,35 +2,13 @@
 // does is the test's own, a speed for a slope, where the diagnosis has a share of the way.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <numbers>
 
-#include "common/random/stream.h"
-#include "common/robot/robot_file.h"
 #include "master/ground/diagnose_ground.h"
+#include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {
 namespace {
-
-using std::numbers::pi;
-
-constexpr char kRobot[] = R"(
-drive = "differential"
-commands = ["left", "right"]
-wheel_separation = 0.3
-mass = 5
-[wheels.left]
-radius = 0.05
-[wheels.right]
-radius = 0.05
-)";
-
-GroundRobot small_robot() {
-  auto robot = parse_robot(kRobot, "robot.toml");
-  EXPECT_TRUE(robot.ok()) << robot.error().message;
-  return *robot;
-}
 
 // Four runs of 30 s with other speeds every two seconds.  Downhill the rims run `gained_m_s` ahead
 // of what is commanded.
@@ -67,8 +45,12 @@ RunLog driven_on_slope(double gained_m_s, double downhill_rad, std::uint64_t see
   return log;
 }
 
+// Its wheels follow at once, and its middle is what is tracked.
 Diagnosis diagnosed_slope(const RunLog& log) {
-  auto result = diagnose_ground(small_robot(), log, {});
+  GroundRobot robot = robot_of(kDifferential);
+  robot.motors.lag_s = 0;
+  robot.X_RM = {};
+  auto result = diagnose_ground(robot, log, {});
   EXPECT_TRUE(result.ok()) << result.error().message;
   return result.ok() ? std::move(result->diagnosis) : Diagnosis{};
 }
