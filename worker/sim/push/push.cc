@@ -183,10 +183,15 @@ void PathRecorder::finish() {
 }
 
 std::unique_ptr<PushSimulator> make_push_simulator(const PushSettings& settings) {
-  // By PushModel.
-  constexpr decltype(&make_push_world) kModels[] = {make_push_world, make_limit_surface,
-                                                    make_distributed_push};
-  return kModels[static_cast<std::size_t>(settings.model)](settings);
+  switch (settings.model) {
+    case PushModel::kBullet:
+      return make_push_world(settings);
+    case PushModel::kLimitSurface:
+      return make_limit_surface(settings);
+    case PushModel::kDistributed:
+      return make_distributed_push(settings);
+  }
+  return nullptr;
 }
 
 std::unique_ptr<PushSimulator> make_push_world(const PushSettings& settings) {
