@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "common/base/build_info.h"
+#include "common/base/clock.h"
 #include "common/external/simulator.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"

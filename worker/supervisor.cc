@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/base/clock.h"
 #include "common/base/try.h"
 
 namespace gapfarm {

@@ -3,9 +3,9 @@
 #include <filesystem>
 
 #include "common/base/build_info.h"
+#include "common/base/clock.h"
 #include "common/config/sections.h"
 #include "common/external/simulator.h"
-#include "common/process/process_pool.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"

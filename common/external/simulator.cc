@@ -197,11 +197,10 @@ LineLimits limits_of(const ExternalCommand& command) {
 void allow_external_programs(bool allowed) { programs_allowed = allowed; }
 bool external_programs_allowed() { return programs_allowed; }
 
-ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineProgram::Clock clock)
+ExternalSimulator::ExternalSimulator(const ExternalCommand& command, Clock clock)
     : ExternalSimulator(command, limits_of(command), clock) {}
 
-ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineLimits limits,
-                                     LineProgram::Clock clock)
+ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineLimits limits, Clock clock)
     : program_(command.argv, command.folder, limits, clock) {}
 
 Result<std::string> ExternalSimulator::introduce() {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "common/base/result.h"
 #include "common/external/protocol.h"
 
@@ -24,8 +25,6 @@ struct LineLimits {
 // it.  Its stderr is this process's.  One thread at a time.
 class LineProgram {
  public:
-  using Clock = double (*)();  // seconds; never goes back
-
   // `words`: program and arguments, found by PATH, started in `folder`.
   LineProgram(std::vector<std::string> argv, std::string folder, LineLimits limits, Clock clock);
   ~LineProgram();
@@ -73,8 +72,8 @@ bool external_programs_allowed();
 
 class ExternalSimulator {
  public:
-  ExternalSimulator(const ExternalCommand& command, LineProgram::Clock clock);
-  ExternalSimulator(const ExternalCommand& command, LineLimits limits, LineProgram::Clock clock);
+  ExternalSimulator(const ExternalCommand& command, Clock clock);
+  ExternalSimulator(const ExternalCommand& command, LineLimits limits, Clock clock);
 
   // The line in which it introduces itself; starts it if it does not run.  Errors: LineProgram's
   // and parse_declaration()'s.

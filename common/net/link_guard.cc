@@ -13,7 +13,7 @@
 #include <random>
 #include <utility>
 
-#include "common/process/process_pool.h"
+#include "common/base/clock.h"
 
 namespace gapfarm {
 namespace {

@@ -10,9 +10,9 @@
 #include <utility>
 #include <zmq.hpp>
 
+#include "common/base/clock.h"
 #include "common/base/try.h"
 #include "common/net/link_guard.h"
-#include "common/process/process_pool.h"
 
 namespace gapfarm {
 

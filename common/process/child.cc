@@ -12,7 +12,7 @@
 #include <array>
 #include <cerrno>
 
-#include "common/process/process_pool.h"
+#include "common/base/clock.h"
 
 namespace gapfarm {
 namespace {

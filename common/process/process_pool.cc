@@ -18,6 +18,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/base/clock.h"
 #include "common/process/child.h"
 
 namespace gapfarm {
@@ -50,12 +51,6 @@ Error trouble(const char* what) {
 }
 
 }  // namespace
-
-double monotonic_seconds() {
-  timespec t = {};
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 bool die_with_parent(pid_t pid) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);

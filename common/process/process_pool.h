@@ -189,7 +189,4 @@ bool die_with_parent(pid_t pid);
 // Of the running executable; empty when /proc is missing.
 std::string executable_path();
 
-// Seconds of CLOCK_MONOTONIC: for timeouts and schedules only, never in a result.
-double monotonic_seconds();
-
 }  // namespace gapfarm

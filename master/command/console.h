@@ -7,10 +7,10 @@
 #include <string>
 #include <string_view>
 
+#include "common/base/clock.h"
 #include "common/base/result.h"
 #include "common/json/json.h"
 #include "common/log/log.h"
-#include "common/process/process_pool.h"
 #include "common/progress/number_text.h"
 #include "common/progress/overall_progress.h"
 
@@ -18,8 +18,6 @@ namespace gapfarm {
 
 class Console {
  public:
-  using Clock = double (*)();  // seconds; never goes back
-
   explicit Console(std::FILE* out = stdout, std::FILE* err = stderr,
                    Clock clock = monotonic_seconds);
   ~Console();

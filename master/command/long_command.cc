@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
+#include "common/base/clock.h"
 #include "common/base/hash.h"
 #include "common/base/try.h"
 #include "common/json/json.h"

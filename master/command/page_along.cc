@@ -12,6 +12,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "common/base/clock.h"
 #include "common/base/shell.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "common/base/build_info.h"
+#include "common/base/clock.h"
 #include "common/base/try.h"
 #include "common/net/envelope.h"
 #include "common/problem/problem.h"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "common/base/clock.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/problem/run_files.h"

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "common/base/result.h"
-#include "common/process/process_pool.h"
 #include "gapfarm/v1/task.pb.h"
 #include "master/farm/farm.h"
 #include "master/store/database.h"
@@ -88,8 +88,6 @@ struct RecordedProgress {
 class RecordedFarm : public Farm {
  public:
   // Seconds of a clock that never goes back.
-  using Clock = double (*)();
-
   // The store outlives this.  Null: nothing is remembered, and progress is shown all the same.
   RecordedFarm(std::shared_ptr<Farm> farm, AnswerStore* store, Clock clock = monotonic_seconds);
   ~RecordedFarm() override;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "common/process/process_pool.h"
 #include "master/farm/socket_farm.h"
 

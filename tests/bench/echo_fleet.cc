@@ -21,8 +21,8 @@
 #include <zmq.hpp>
 
 #include "common/base/build_info.h"
+#include "common/base/clock.h"
 #include "common/net/envelope.h"
-#include "common/process/process_pool.h"
 #include "worker/pump.h"
 
 namespace gapfarm {

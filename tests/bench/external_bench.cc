@@ -7,6 +7,7 @@
 #include <iostream>
 #include <string>
 
+#include "common/base/clock.h"
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"
 

@@ -13,6 +13,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "tests/bench/bench_farm_setup.h"
 
 namespace gapfarm {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "common/base/clock.h"
 #include "tests/bench/bench_farm_setup.h"
 #include "tests/bench/echo_fleet.h"
 

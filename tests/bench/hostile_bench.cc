@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "tests/bench/fleet_bench.h"
 #include "tests/integration/hostile_peers.h"
 

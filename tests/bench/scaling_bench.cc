@@ -15,6 +15,7 @@
 #include <fstream>
 #include <thread>
 
+#include "common/base/clock.h"
 #include "tests/bench/farm_model.h"
 #include "tests/bench/fleet_bench.h"
 

@@ -9,10 +9,11 @@
 #include <queue>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 #include <zmq.hpp>
 
-#include "common/process/process_pool.h"
+#include "common/base/clock.h"
 #include "common/process/stop.h"
 
 namespace gapfarm {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "common/process/process_pool.h"
 #include "common/process/stop.h"
 #include "master/farm/socket_farm.h"

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "common/net/socket.h"
 #include "tests/integration/farm_fixture.h"
 #include "worker/service.h"

@@ -1,6 +1,6 @@
 #include "worker/scenarios/program.h"
 
-#include "common/process/process_pool.h"
+#include "common/base/clock.h"
 #include "worker/scenarios/outcome.h"
 
 namespace gapfarm {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/clock.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/base/try.h"

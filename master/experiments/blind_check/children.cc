@@ -14,9 +14,9 @@
 #include <cstring>
 #include <optional>
 
+#include "common/base/clock.h"
 #include "common/base/try.h"
 #include "common/process/child.h"
-#include "common/process/process_pool.h"
 #include "master/farm/farm.h"
 
 namespace gapfarm {

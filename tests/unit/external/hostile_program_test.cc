@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include "common/base/clock.h"
 #include "common/external/simulator.h"
-#include "common/process/process_pool.h"
 
 namespace gapfarm::hostile_program_test {
 

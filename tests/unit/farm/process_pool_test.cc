@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "common/base/clock.h"
 #include "common/process/stop.h"
 #include "master/farm/local_workers.h"
 
