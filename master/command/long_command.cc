@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
@@ -19,7 +20,6 @@
 #include "common/process/child.h"
 #include "common/trials/files.h"
 #include "master/command/context.h"
-#include "master/command/long_command.h"
 
 namespace gapfarm {
 
@@ -46,7 +46,7 @@ std::vector<std::string> own_arguments() {
   return program_arguments;
 }
 
-// How many workers and how loud changes nothing of what is asked; cheap to leave at that.
+// Empty where nothing says whose state it would be.
 std::string state_folder() {
   const char* state = std::getenv("XDG_STATE_HOME");
   if (state != nullptr && *state == '/') return std::string(state) + "/gapfarm";

@@ -187,38 +187,27 @@ std::vector<ProgressStage> stages_of(const std::vector<std::string>& groups,
   });
 }
 
-v1::Task evaluate_task(const Genome& genome, std::uint64_t seed, std::uint64_t birth_id) {
-  v1::Task task;
-  v1::EvaluateTask* evaluate = task.mutable_evaluate();
-  evaluate->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
-  evaluate->mutable_stream()->set_run_seed(seed);
-  evaluate->mutable_stream()->set_birth_id(birth_id);
-  return task;
-}
-
 class Backend : public EvaluationBackend {
  public:
   Backend(const Problem& problem, Farm& farm, std::uint64_t seed)
-      : kind_(problem.fitness.kind), farm_(farm), seed_(seed) {
+      : fitness_(problem.fitness), farm_(farm), seed_(seed) {
     hash_ = farm.add_problem(to_proto(problem));
   }
 
   Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override {
-    std::vector<v1::Task> tasks;
-    for (const Candidate& c : candidates)
-      tasks.push_back(evaluate_task(c.genome, seed_, c.birth_id));
+    const auto tasks =
+        mapped(candidates, [&](const Candidate& c) { return evaluation_task(c, seed_); });
     ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
     std::vector<Score> scores;
     for (const v1::TaskResult& result : results) {
-      const bool ok = result.outcome() == v1::OK;
-      scores.push_back(
-          {result.outcome(), ok ? cost_of_fitness(kind_, result.evaluate().fitness()) : 0});
+      ASSIGN_OR_RETURN(Score score, score_of(result, fitness_));
+      scores.push_back(std::move(score));
     }
     return scores;
   }
 
  private:
-  FitnessKind kind_;
+  FitnessSettings fitness_;
   Farm& farm_;
   std::uint64_t seed_;
   std::string hash_;
