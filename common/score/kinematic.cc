@@ -9,6 +9,7 @@
 
 #include "common/base/constants.h"
 #include "common/robot/robot_drive.h"
+#include "common/score/floor_parts.h"
 #include "common/score/measured_path.h"
 #include "common/score/omni_inverse.h"
 
@@ -16,9 +17,6 @@ namespace gapfarm {
 namespace {
 
 constexpr double kStep_s = 0.04;  // the longest
-// Half of the way over which a wheel passes from one floor to the other (what touches the floor and
-// what a tracker errs by): a hard step would have no slope.
-constexpr double kEdge_m = 0.02;
 
 // The robot and the gains of its motion at some values.
 class Body {
@@ -26,6 +24,7 @@ class Body {
   Body(const GroundRobot& robot, const Kinematics& at)
       : robot_(robot),
         load_(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0)),
+        origin_m_(at.origin_m),
         reach_m_(wheel_reach_m(robot)) {
     for (std::size_t i = 0; i < at.names.size(); ++i) {
       put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
@@ -100,7 +99,7 @@ class Body {
   const GroundRobot& robot() const { return robot_; }
 
   // Whether it matters where the robot is and which way it heads.
-  bool knows_place() const { return edge_ratio_ != 1 || !downhill_.isZero(); }
+  bool knows_place() const { return !floor_.even() || !downhill_.isZero(); }
 
   // `X_WR`: where the robot is, if that matters.
   Twist velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive,
@@ -113,7 +112,7 @@ class Body {
   Twist on_level(std::span<const WheelMotion> wheels, const RobotDrive& drive,
                  const Pose* X_WR) const {
     if (is_steered(robot_)) {
-      return on_floor(ahead_ * beyond_edge(X_WR, {}) * drive.traction_m_s(), drive.curvature());
+      return on_floor(ahead_ * floor_under(X_WR, {}) * drive.traction_m_s(), drive.curvature());
     }
     if (is_holonomic(robot_)) {
       Eigen::VectorXd speeds(inverse_.cols()), tractions(inverse_.cols());
@@ -121,7 +120,7 @@ class Body {
       for (std::size_t i = 0; i < wheels.size(); ++i) {
         const RobotWheel& w = robot_.wheels[i];
         if (!w.driven) continue;
-        tractions[n] = traction_ * beyond_edge(X_WR, {*w.x_m, *w.y_m, 0});
+        tractions[n] = traction_ * floor_under(X_WR, {*w.x_m, *w.y_m, 0});
         speeds[n++] = wheels[i].speed_m_s * std::cos(w.roller_angle_rad);
       }
       if (X_WR != nullptr && tractions != tractions_) {
@@ -138,7 +137,7 @@ class Body {
       const RobotWheel& w = robot_.wheels[i];
       const int side = w.side == WheelSide::kLeft ? 0 : 1;
       sum[side] +=
-          beyond_edge(X_WR, {w.x_m.value_or(0), w.y_m.value_or(0), 0}) * wheels[i].speed_m_s;
+          floor_under(X_WR, {w.x_m.value_or(0), w.y_m.value_or(0), 0}) * wheels[i].speed_m_s;
       count[side] += 1;
     }
     const double l = left_ * sum[0] / std::max(count[0], 1.0);
@@ -161,9 +160,7 @@ class Body {
     if (name == "traction") traction_ = value;
     if (name == "load_x") load_[0] = value;
     if (name == "load_y") load_[1] = value;
-    if (name == "edge_angle") edge_rad_ = value;
-    if (name == "edge_offset") edge_m_ = value;
-    if (name == "edge_ratio") edge_ratio_ = value;
+    floor_.put(name, value);
     if (name == "downhill_x") downhill_[0] = value;
     if (name == "downhill_y") downhill_[1] = value;
     if (name == "separation") separation_ = value;
@@ -227,11 +224,10 @@ class Body {
   }
 
   // What the floor makes of the travel of a wheel there.
-  double beyond_edge(const Pose* X_WR, const Pose& X_RW) const {
+  double floor_under(const Pose* X_WR, const Pose& X_RW) const {
     if (X_WR == nullptr) return 1;
     const Pose at = *X_WR * X_RW;
-    const double beyond = at.x * std::cos(edge_rad_) + at.y * std::sin(edge_rad_) - edge_m_;
-    return 1 + (edge_ratio_ - 1) * std::clamp(0.5 + beyond / (2 * kEdge_m), 0.0, 1.0);
+    return floor_.ratio_at(Eigen::Vector2d(at.x, at.y) - origin_m_);
   }
 
   // What tyres make of a speed and a curvature: the acceleration to the side nears what the floor
@@ -269,14 +265,15 @@ class Body {
   double travel_ = 1, traction_ = 1;  // of holonomic robots
   Eigen::Vector2d load_;              // where the weight stands on their wheels
   double sag_ = 0, drift_ = 0, rate_ = 0, scale_ = 1, aspect_ = 1;
-  double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
+  FloorParts floor_;
+  Eigen::Vector2d origin_m_;
   Eigen::Vector2d downhill_ = Eigen::Vector2d::Zero();  // in the tracker's frame
   double reach_m_;
   std::optional<double> grip_m_s2_;  // none: no speed slips
   double slip_angle_rad_ = 0;
   double grip_shape_ = 2;
   std::optional<OmniWheels> omni_;
-  // Of the tractions that wheels had last: they change while wheels cross an edge.
+  // Of the tractions that wheels had last: they change while wheels cross to another floor.
   mutable Eigen::VectorXd tractions_;
   mutable Eigen::MatrixXd inverse_;
 };

@@ -19,6 +19,9 @@ struct Kinematics {
   Eigen::VectorXd values;
   double rms_m = 0;  // of the windows that it was fitted to
   double rms_rad = 0;
+  // Where parts of the floor are measured from, in the tracker's frame: places far from there are
+  // unsure by what angles are.
+  Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();
 
   void add(std::string name, double value);
   // Where a name stands; -1: nowhere.
@@ -53,10 +56,11 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // a robot that does not turn goes of its wheels' way, since rollers resist being rolled aside;
 // loaded wheels pull and drag more) with "load_x" and "load_y" (m: where the weight stands on
 // them); "edge_angle" (rad), "edge_offset" (m) and "edge_ratio": two floors.  Beyond the line of
-// points p with p (cos angle, sin angle) = offset, in the tracker's frame, a wheel travels ratio
-// times as far, of omni and mecanum wheels with that of the traction; "downhill_x" and "_y" (of the
-// tracker's frame): how much farther than its wheels' way a robot goes downhill, over how far they
-// roll; of robots that skid over how far turns drag their wheels.
+// points p with p (cos angle, sin angle) = offset, from the origin along the tracker's axes, a
+// wheel travels ratio times as far, of omni and mecanum wheels with that of the traction;
+// "patch_x", "_y", "_radius" (m) and "patch_ratio": the same within a circle; "downhill_x" and "_y"
+// (of the tracker's frame): how much farther than its wheels' way a robot goes downhill, over how
+// far they roll; of robots that skid over how far turns drag their wheels.
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
                                  std::span<const Trial> trials, const Kinematics& kinematics);
 

@@ -6,9 +6,10 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "master/ground/fit/edge.h"
-#include "master/ground/fit/tilt.h"
+#include "master/ground/fit/scans.h"
 #include "master/ground/fit/window_set.h"
+#include "master/ground/floor/regions.h"
+#include "master/ground/floor/tilt.h"
 #include "master/ground/put_right.h"
 #include "master/ground/tolerances.h"
 
@@ -69,6 +70,13 @@ class Catalogue {
   const GroundRobot& robot_;
   std::vector<KinematicRow> rows_;
 };
+
+// Of what does not depend on the fit that it is offered beside.
+auto from_scan(Eigen::VectorXd (*scan)(const WindowFitter&, const std::vector<FitRow>&,
+                                       const Eigen::VectorXd&)) {
+  return [scan](const WindowFitter& fitter, const WindowFit&, const std::vector<FitRow>& rows,
+                const Eigen::VectorXd& values) { return scan(fitter, rows, values); };
+}
 
 // `alias`: what else makes all motions larger than commanded.
 struct CommandUnit {
@@ -222,7 +230,8 @@ void Catalogue::steering() {
 
 void Catalogue::motors() {
   value("command_delay", {"pose_latency", "clock_offset"}, "the time from a command to its pose",
-        {row("delay")});
+        {row("delay")})
+      .propose = from_scan(scan_delay);
   value("clock_drift", {"clock_offset"}, "the rate of one clock against the other",
         {{"drift", 0, 2e-5, "rate", "s/s"}});
   value("clock_drift", {"clock_offset"}, "the rate of the robot's clock against the tracker's",
@@ -272,6 +281,7 @@ void Catalogue::tracker() {
 // Where on the floor, and which way.
 void Catalogue::world() {
   all.push_back(floor_edge());
+  all.push_back(friction_patch());
   all.push_back(floor_tilt());
 }
 
@@ -281,7 +291,8 @@ void Catalogue::floors() {
   const char* slips = "how far the wheels travel a turn";
   if (is_steered(robot_)) {
     value("friction", {"friction_anisotropy"}, "friction across the wheels",
-          {row("grip"), row("slip_angle"), row("grip_shape")});
+          {row("grip"), row("slip_angle"), row("grip_shape")})
+        .propose = from_scan(scan_grip);
     if (!is_throttled(robot_))
       value("floor", {"wheel_slip", "wheel_radius"}, slips, {row("ahead")});
   } else if (skids(robot_)) {

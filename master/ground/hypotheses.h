@@ -2,6 +2,7 @@
 // diagnosis (docs/ground.md).
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -27,6 +28,7 @@ struct KinematicRow {
 
 struct NamedEffect;
 class WindowFitter;
+struct FitRow;
 struct WindowFit;
 
 struct GroundHypothesis {
@@ -45,6 +47,14 @@ struct GroundHypothesis {
   // Parameters and text of the named effect; empty: its values' own.
   std::function<void(const WindowFitter&, const WindowFit&, std::uint64_t seed, NamedEffect*)>
       describe = {};
+  // Values to begin at, where slopes at those that stand may not lead to the best; `rows` are those
+  // of the fit and behind them its own.  Empty, or what was given: nowhere better.
+  std::function<Eigen::VectorXd(const WindowFitter&, const WindowFit&,
+                                const std::vector<FitRow>& rows, const Eigen::VectorXd& values)>
+      propose = {};
+  // Nats that a fit with its values gains over one without; empty: what the objectives differ by.
+  std::function<double(const WindowFitter&, const WindowFit& with, const WindowFit& without)> gain =
+      {};
 };
 
 // Standard deviation of a value that is wrong (kPlausibleErrors).

@@ -9,6 +9,7 @@
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
+#include "master/ground/fit/scans.h"
 #include "master/ground/search.h"
 #include "master/ground/tolerances.h"
 

@@ -10,7 +10,7 @@
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "master/ground/fit/edge.h"
+#include "master/ground/fit/scans.h"
 #include "master/ground/tolerances.h"
 #include "master/io/log_checks/run_checks.h"
 
@@ -68,10 +68,10 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
       Eigen::VectorXd values = fit.values;
       std::vector<FitRow> rows = with_freed(fit.rows, h, &values);
       if (rows.size() == fit.rows.size()) continue;
-      if (h.name == kFloorEdge) values = scan_floor_edge(fitter, fit, rows, values);
+      if (h.propose) values = h.propose(fitter, fit, rows, values);
       for (std::size_t k = 0; k < rows.size(); ++k) {
         const bool fresh = k >= fit.rows.size();
-        rows[k].free = fresh ? h.name == kFloorEdge : fit.rows[k].free;  // a line is anywhere
+        rows[k].free = fresh ? h.propose != nullptr : fit.rows[k].free;  // may be anywhere
         if (fresh) rows[k].row.tolerance *= kFarOff;
       }
       if (fitter.promise(fit, slopes, rows, values) < kLeastPromise) continue;
@@ -216,6 +216,7 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
     reference.units.push_back(row.row.unit);
   }
   reference.values = fit.values;
+  reference.origin_m = fitter.origin_m();
   reference.windows = fitter.ended_windows(fit);
   reference.draws = fitter.draws(fit, seed, /*all=*/alone).colwise() - fit.values;
   if (const Eigen::Index grip = row_index(fit.rows, "grip"); grip >= 0) {

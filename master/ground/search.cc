@@ -8,33 +8,11 @@
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "master/ground/diagnose_ground.h"
-#include "master/ground/fit/edge.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
-
-// Where to begin with another floor: changes of a grip's logarithm, and logarithms of its shape.
-constexpr double kGripChanges[] = {0, -0.3, -0.7, -1.1, -1.6, -2.2, 0.5};
-constexpr double kGripShapes[] = {0.7, 1.8};
-constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the file's delay
-
-// Values whose grip is the best of those far and near: past the limit of a tyre no slope leads
-// back.
-Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                          const Eigen::VectorXd& values) {
-  const Eigen::Index grip = row_index(rows, "grip"), shape = row_index(rows, "grip_shape");
-  std::vector<Eigen::VectorXd> others;
-  for (const double change : kGripChanges) {
-    for (const double sharp : kGripShapes) {
-      Eigen::VectorXd& moved = others.emplace_back(values);
-      moved[grip] += change;
-      moved[shape] = sharp;
-    }
-  }
-  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
-}
 
 // `slopes`: of the search's fit.
 Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
@@ -42,14 +20,9 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
   const GroundHypothesis& hypothesis = search.catalogue[index];
   Eigen::VectorXd values = search.fit.values;
   const std::vector<FitRow> rows = with_freed(search.rows, hypothesis, &values);
-  if (hypothesis.freed.size() == 1 && hypothesis.freed[0].name == "delay") {
-    values = scan_delay(fitter, rows, values);
-  }
-  if (hypothesis.name == "friction") values = scan_grip(fitter, rows, values);
-  if (hypothesis.name == kFloorEdge) values = scan_floor_edge(fitter, search.fit, rows, values);
-  const bool afar =
-      hypothesis.name == kFloorEdge || values.head(search.fit.values.size()) != search.fit.values;
-  if (!afar) {
+  const Eigen::VectorXd here = values;
+  if (hypothesis.propose) values = hypothesis.propose(fitter, search.fit, rows, here);
+  if (values == here) {
     const double promised = fitter.promise(search.fit, slopes, rows, values);
     if (promised < kLeastPromise) return {index, std::max(promised, 0.0), {}};
   }
@@ -274,30 +247,11 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
 
 }  // namespace
 
-Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                          const Eigen::VectorXd& values, double most,
-                          const std::vector<Eigen::VectorXd>& others) {
-  Eigen::VectorXd best = values;
-  for (const Eigen::VectorXd& other : others) {
-    const double objective = fitter.hold(rows, other).objective;
-    if (objective <= most) continue;
-    most = objective;
-    best = other;
-  }
-  return best;
-}
-
-Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                           const Eigen::VectorXd& values) {
-  std::vector<Eigen::VectorXd> others;
-  for (double size = 0.1; size <= kFar_s; size += size < kNear_s     ? 0.1
-                                                  : size < kMiddle_s ? 0.25
-                                                                     : 0.5) {
-    for (const double shift : {size, -size}) {
-      others.emplace_back(values)[row_index(rows, "delay")] += shift;
-    }
-  }
-  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
+double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
+               const WindowFit& with, const WindowFit& without) {
+  const double gain =
+      hypothesis.gain ? hypothesis.gain(fitter, with, without) : with.objective - without.objective;
+  return gain - hypothesis.price;
 }
 
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,

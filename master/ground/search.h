@@ -140,16 +140,9 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
 Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
                                    const GroundQuestion& question, const GroundWork& work);
 
-// The best of some values, each as it is with scales of its own, and of those that `most` nats are
-// of.
-Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                          const Eigen::VectorXd& values, double most,
-                          const std::vector<Eigen::VectorXd>& others);
-
-// Values whose delay is the best of those within 10 s of where it stands: one that is far off is
-// no slope away.
-Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                           const Eigen::VectorXd& values);
+// Nats that a fit with a hypothesis gains over one without, its price paid.
+double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
+               const WindowFit& with, const WindowFit& without);
 
 // The file's rows with those of a hypothesis freed, new ones behind; `values` grows with them.
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,

@@ -91,9 +91,14 @@ inline constexpr PlausibleError kPlausibleErrors[] = {
     {"marker_y", 0.3, "m"},
     {"marker_yaw", 0.5, "rad"},
     {"gyro_scale", 0.05, "-"},
-    // MuJoCo's robots on slopes of 0.02 to 0.1 rad come to 0.01 to 0.8 (scripts/ground_slopes.sh).
+    // MuJoCo's robots on slopes of 0.02 to 0.1 rad come to 0.01 to 0.8 (scripts/ground_floors.sh).
     {"downhill_x", 0.3, "-"},
     {"downhill_y", 0.3, "-"},
+    // The parts of a floor lie and end anywhere.
+    {"edge_offset", 100, "m"},
+    {"patch_x", 100, "m"},
+    {"patch_y", 100, "m"},
+    {"patch_radius", 100, "m"},
     {"pose_scale", 0.05, "-"},
     {"aspect", 0.03, "-"},
 };
@@ -111,9 +116,9 @@ inline constexpr double kLeastChangeGain = 6;
 // nats by second-order slopes below which nothing is fitted: a third of the above.
 inline constexpr double kLeastPromise = kLeastGroundGain / 3;
 inline constexpr double kPriceOfAValue = 2;  // nats that a second value of one name must gain
-// Of an edge: two values more than one, and that the best of some tens of lines that differ was
-// looked for (their logarithm).
-inline constexpr double kPriceOfAnEdge = 2 * kPriceOfAValue + 4;
+// Beside that, of a border between floors: that the best of some tens of lines or circles that
+// differ was looked for (their logarithm).
+inline constexpr double kPriceOfLooking = 4;
 inline constexpr double kShareOfBest = 0.5;  // of the best gain, for an offer to compete held out
 // What a name leaves of itself to others, whose form is never quite right: windows that a further
 // name moves by less than this share of what the names before moved them by do not count for it,

@@ -138,17 +138,32 @@ HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const 
   return with_interval(share(weighted(gained, once), weighted(gap, once)), std::move(drawn));
 }
 
-Eigen::VectorXd jackknife_deviation(const Eigen::MatrixXd& parts) {
-  const auto n = static_cast<double>(parts.cols());
-  const Eigen::VectorXd mean = parts.rowwise().mean();
-  return ((parts.colwise() - mean).rowwise().squaredNorm() * (n - 1) / n).cwiseSqrt();
-}
-
-Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
-                          double deviation, const char* unit) {
-  const auto [lo, hi] = ninety_percent_of(std::move(draws));
-  const double half = kFoldTail * deviation;
-  return {key, value, std::min(lo, value - half), std::max(hi, value + half), unit};
+std::vector<Estimate> derived_estimates(
+    const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
+    const std::function<std::vector<Estimate>(const Eigen::VectorXd&)>& derive) {
+  std::vector<Estimate> estimates = derive(fit.values);
+  const Eigen::MatrixXd draws = fitter.draws(fit, seed);
+  std::vector<std::vector<double>> drawn(estimates.size());
+  for (const auto& values : draws.colwise()) {
+    const std::vector<Estimate> derived = derive(values);
+    for (std::size_t k = 0; k < drawn.size(); ++k) drawn[k].push_back(derived[k].value);
+  }
+  Eigen::ArrayXXd parts(estimates.size(), kFolds);
+  const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
+  for (Eigen::Index f = 0; f < kFolds; ++f) {
+    const std::vector<Estimate> derived = derive(folds[static_cast<std::size_t>(f)].values);
+    for (std::size_t k = 0; k < derived.size(); ++k) parts(k, f) = derived[k].value;
+  }
+  const Eigen::ArrayXd squares =
+      (parts.colwise() - parts.rowwise().mean()).square().rowwise().sum();
+  const Eigen::ArrayXd half = kFoldTail * (squares * (kFolds - 1) / kFolds).sqrt();
+  for (std::size_t k = 0; k < estimates.size(); ++k) {
+    Estimate& e = estimates[k];
+    const auto [lo, hi] = ninety_percent_of(std::move(drawn[k]));
+    e.lo = std::min(lo, e.value - half[k]);
+    e.hi = std::max(hi, e.value + half[k]);
+  }
+  return estimates;
 }
 
 }  // namespace gapfarm

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "common/base/interval.h"
@@ -29,12 +30,12 @@ std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint
 // What nine in ten of some draws lie within.
 Interval ninety_percent_of(std::vector<double> drawn);
 
-// Of the mean of columns that each omit one part of the log in turn (the jackknife).
-Eigen::VectorXd jackknife_deviation(const Eigen::MatrixXd& parts);
-
-// 90 % of some draws; no less wide than a deviation with the folds' degrees of freedom.
-Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
-                          double deviation, const char* unit);
+// What follows from a fit's values, with 90 % of the draws, no less wide than by what fits without
+// one of the folds each scatter by (the jackknife): slopes where few windows lie, and forms that
+// are right by some share only, make draws too sure.
+std::vector<Estimate> derived_estimates(
+    const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
+    const std::function<std::vector<Estimate>(const Eigen::VectorXd& values)>& derive);
 
 // Nats a window, with a 90 % interval by runs and blocks drawn again.
 struct HeldOutGain {

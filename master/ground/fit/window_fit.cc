@@ -114,6 +114,7 @@ Kinematics WindowFitter::kinematics(const std::vector<FitRow>& rows,
   Kinematics at;
   at.values = values;
   for (const FitRow& row : rows) at.names.push_back(row.row.name);
+  at.origin_m = origin_m();
   if (reference_) reference_->complete(&at);
   return at;
 }

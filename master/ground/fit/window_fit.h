@@ -130,6 +130,10 @@ class WindowFitter {
 
   const WindowSet& windows() const { return windows_; }
   const GroundRobot& robot() const { return robot_; }
+  // Of Kinematics: the reference's where there is one.
+  const Eigen::Vector2d& origin_m() const {
+    return reference_ ? reference_->origin_m : windows_.origin_m;
+  }
 
   // The likeliest WindowSet::least_noise by a fit's residuals, of some; as it is where nothing is
   // stated.

@@ -212,6 +212,8 @@ Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
   }
   if (set.trials.empty()) return Error{"no window of any horizon fits into the runs"};
   set.lengths = set.horizons;
+  for (const Trial& trial : set.trials) set.origin_m += Eigen::Vector2d(trial.X_WS.x, trial.X_WS.y);
+  set.origin_m /= static_cast<double>(set.trials.size());
   add_noise(log, &set);
   add_gyro(log, &set);
   add_returns(robot, log, &set);

@@ -46,6 +46,7 @@ struct WindowSet {
   double least_noise = 0.1;
   std::vector<double> turned_rad;  // of each trial by the gyro, its bias in; empty: there is none
   std::vector<Return> returns;
+  Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();  // the middle of where trials begin
   // The trials' measured ends as a simulation expects them, at each of some values; empty: as the
   // robot's kinematics do.
   std::function<std::vector<std::vector<Pose>>(const std::vector<Kinematics>&)> simulated = {};

@@ -1,4 +1,4 @@
-#include "master/ground/fit/tilt.h"
+#include "master/ground/floor/tilt.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -18,34 +18,21 @@ namespace {
 void describe_floor_tilt(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
                          NamedEffect* effect) {
   const Eigen::Index x = row_index(fit.rows, "downhill_x"), y = row_index(fit.rows, "downhill_y");
-  const auto downhill = [&](const auto& values) {
+  const auto downhill = [&](const Eigen::VectorXd& values) {
     return Eigen::Vector2d(values[x] - fit.rows[x].row.nominal,
                            values[y] - fit.rows[y].row.nominal);
   };
   const Eigen::Vector2d down = downhill(fit.values);
   const double angle = std::atan2(down[1], down[0]);
   // Along what was found: lengths of vectors that are unsure are too long.
-  const auto polar = [&](const Eigen::Vector2d& v) {
-    return Eigen::Vector2d(v.dot(down) / down.norm(),
-                           angle + wrap_angle(std::atan2(v[1], v[0]) - angle));
-  };
-  std::vector<double> shares, angles;
-  const Eigen::MatrixXd draws = fitter.draws(fit, seed);
-  for (const auto& values : draws.colwise()) {
-    const Eigen::Vector2d drawn = polar(downhill(values));
-    shares.push_back(drawn[0]);
-    angles.push_back(drawn[1]);
-  }
-  // How a slope moves a robot is motors' and contacts' own, no share of its way to the digit: parts
-  // of the log differ by more than their noise.
-  const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
-  Eigen::MatrixXd parts(2, kFolds);
-  for (int k = 0; k < kFolds; ++k) parts.col(k) = polar(downhill(folds[k].values));
-  const Eigen::VectorXd deviation = jackknife_deviation(parts);
-  const Estimate share =
-      widened_estimate("share", down.norm(), std::move(shares), deviation[0], "-");
-  const Estimate way = widened_estimate("direction", angle, std::move(angles), deviation[1], "rad");
-  effect->parameters = {share, way};
+  effect->parameters = derived_estimates(fitter, fit, seed, [&](const Eigen::VectorXd& values) {
+    const Eigen::Vector2d v = downhill(values);
+    const double way = angle + wrap_angle(std::atan2(v[1], v[0]) - angle);
+    return std::vector<Estimate>{{"share", v.dot(down) / down.norm(), 0, 0, "-"},
+                                 {"direction", way, 0, 0, "rad"}};
+  });
+  const Estimate& share = effect->parameters[0];
+  const Estimate& way = effect->parameters[1];
   const std::string farther =
       fmt::format("{:.1f} % [{:.1f}, {:.1f}]", 100 * share.value, 100 * share.lo, 100 * share.hi);
   effect->text = fmt::format(

@@ -1,0 +1,53 @@
+#include "master/ground/fit/scans.h"
+
+namespace gapfarm {
+namespace {
+
+// Where to begin with another floor: changes of a grip's logarithm, and logarithms of its shape.
+constexpr double kGripChanges[] = {0, -0.3, -0.7, -1.1, -1.6, -2.2, 0.5};
+constexpr double kGripShapes[] = {0.7, 1.8};
+constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the file's delay
+
+}  // namespace
+
+Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                          const Eigen::VectorXd& values, double most,
+                          const std::vector<Eigen::VectorXd>& others) {
+  Eigen::VectorXd best = values;
+  for (const Eigen::VectorXd& other : others) {
+    const double objective = fitter.hold(rows, other).objective;
+    if (objective <= most) continue;
+    most = objective;
+    best = other;
+  }
+  return best;
+}
+
+Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                           const Eigen::VectorXd& values) {
+  std::vector<Eigen::VectorXd> others;
+  for (double size = 0.1; size <= kFar_s; size += size < kNear_s     ? 0.1
+                                                  : size < kMiddle_s ? 0.25
+                                                                     : 0.5) {
+    for (const double shift : {size, -size}) {
+      others.emplace_back(values)[row_index(rows, "delay")] += shift;
+    }
+  }
+  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
+}
+
+Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                          const Eigen::VectorXd& values) {
+  const Eigen::Index grip = row_index(rows, "grip"), shape = row_index(rows, "grip_shape");
+  std::vector<Eigen::VectorXd> others;
+  for (const double change : kGripChanges) {
+    for (const double sharp : kGripShapes) {
+      Eigen::VectorXd& moved = others.emplace_back(values);
+      moved[grip] += change;
+      moved[shape] = sharp;
+    }
+  }
+  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
+}
+
+}  // namespace gapfarm

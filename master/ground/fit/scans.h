@@ -1,0 +1,27 @@
+// Where to begin with values that slopes at the file's do not lead to.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "master/ground/fit/window_fit.h"
+
+namespace gapfarm {
+
+// The best of some values, each as it is with scales of its own, and of those that `most` nats are
+// of.
+Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                          const Eigen::VectorXd& values, double most,
+                          const std::vector<Eigen::VectorXd>& others);
+
+// Values whose delay is the best of those within 10 s of where it stands: one that is far off is
+// no slope away.
+Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                           const Eigen::VectorXd& values);
+
+// Values whose grip is the best of those far and near: past the limit of a tyre no slope leads
+// back.
+Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                          const Eigen::VectorXd& values);
+
+}  // namespace gapfarm
