@@ -1,8 +1,10 @@
-// Logs of a ground robot on a slope, by MuJoCo:
-//   mujoco_ground_robot KIND TILT STIFFNESS SEED OUT
-// KIND: differential or skid.  TILT in rad.  STIFFNESS of the motors that hold the wheels' speeds,
-// N m s / rad.  Writes OUT/{config.toml, robot.toml, log/, truth.txt}; the robot seeks points of a
-// square of 3 m, four runs of 30 s, seen to 0.7 mm and 2 mrad.
+// Logs of a ground robot on a floor of its own, by MuJoCo:
+//   mujoco_ground_robot KIND FLOOR SIZE STIFFNESS SEED OUT
+// KIND: differential or skid.  FLOOR: tilt (SIZE in rad; 0 is level), edge or patch (SIZE: the
+// lever that rolling resists by beyond it or within it, m, in place of 0.2 mm).  STIFFNESS of the
+// motors that hold the wheels' speeds, N m s / rad.  Writes OUT/{config.toml, robot.toml, log/,
+// truth.txt}; the robot seeks points of a square of 3 m, four runs of 30 s, seen to 0.7 mm and 2
+// mrad.
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
@@ -30,7 +32,12 @@ constexpr double kRest_s = 5;  // between runs, by the log's clock
 
 struct Setting {
   bool skid = false;
-  double tilt_rad = 0, stiffness = 0, downhill_rad = 0;
+  std::string floor;
+  double size = 0, stiffness = 0;
+  double direction_rad = 0;               // downhill, or beyond the edge
+  double x_m = 0, y_m = 0, radius_m = 0;  // on the edge, or the patch
+
+  double tilt_rad() const { return floor == "tilt" ? size : 0; }
 
   double separation_m() const { return skid ? 0.3 : 0.32; }
   // As wheels that skid or roll on balls turn the robot here on a level floor.
@@ -47,19 +54,37 @@ std::string model_of(const Setting& s) {
         "0.0002' solref='0.02 1' solimp='0.5 0.5 0.001 0.5 2'/></body>",
         x, y, name, kRadius_m);
   };
-  const double along = kGravity_m_s2 * std::sin(s.tilt_rad), y = s.separation_m() / 2;
+  const double along = kGravity_m_s2 * std::sin(s.tilt_rad()), y = s.separation_m() / 2;
   std::string xml = text_of(
       "<mujoco><option timestep='%g' cone='elliptic' impratio='50' gravity='%g %g %g'/><worldbody>"
-      "<geom type='plane' size='50 50 1' condim='6' priority='1' friction='0.8 0.003 0.0002'/>"
+      "<geom type='plane' size='50 50 1' condim='6' priority='1' friction='0.8 0.003 0.0002'/>",
+      kStep_s, along * std::cos(s.direction_rad), along * std::sin(s.direction_rad),
+      -kGravity_m_s2 * std::cos(s.tilt_rad()));
+  // A tenth of a millimetre above the plane.
+  const std::string drags = text_of("condim='6' priority='2' friction='0.8 0.003 %g'/>", s.size);
+  if (s.floor == "edge") {
+    xml += text_of("<geom type='box' size='20 20 0.01' pos='%g %g -0.0099' euler='0 0 %g' ",
+                   s.x_m + 20 * std::cos(s.direction_rad), s.y_m + 20 * std::sin(s.direction_rad),
+                   s.direction_rad * 180 / pi) +
+           drags;
+  }
+  if (s.floor == "patch") {
+    xml += text_of("<geom type='cylinder' size='%g 0.01' pos='%g %g -0.0099' ", s.radius_m, s.x_m,
+                   s.y_m) +
+           drags;
+  }
+  xml += text_of(
       "<body pos='0 0 %g'><freejoint/><inertial pos='0 0 -0.01' mass='%g' "
       "diaginertia='0.05 0.06 0.08'/>",
-      kStep_s, along * std::cos(s.downhill_rad), along * std::sin(s.downhill_rad),
-      -kGravity_m_s2 * std::cos(s.tilt_rad), kRadius_m, kMass_kg);
+      kRadius_m, kMass_kg);
   if (s.skid) {
-    xml += wheel("front_left", 0.12, y) + wheel("rear_left", -0.12, y) +
-           wheel("front_right", 0.12, -y) + wheel("rear_right", -0.12, -y);
+    xml += wheel("front_left", 0.12, y);
+    xml += wheel("rear_left", -0.12, y);
+    xml += wheel("front_right", 0.12, -y);
+    xml += wheel("rear_right", -0.12, -y);
   } else {
-    xml += wheel("left", 0, y) + wheel("right", 0, -y);
+    xml += wheel("left", 0, y);
+    xml += wheel("right", 0, -y);
     for (const double x : {-0.15, 0.15}) {
       xml += text_of(
           "<geom type='sphere' size='0.02' pos='%g 0 -0.0292' mass='0.05' condim='3' "
@@ -156,8 +181,8 @@ void write_robot(const Robot& robot, const Setting& s, const std::string& out) {
   }
   std::ofstream(out + "/config.toml") << "scenario = \"ground\"\n[robot]\nfile = \"robot.toml\"\n"
                                          "[runs]\nfolders = [\"log\"]\n";
-  std::ofstream(out + "/truth.txt")
-      << text_of("tilt %g rad, downhill %.3f rad\n", s.tilt_rad, s.downhill_rad);
+  std::ofstream(out + "/truth.txt") << text_of("direction %.4f\nx %.4f\ny %.4f\nradius %.4f\n",
+                                               s.direction_rad, s.x_m, s.y_m, s.radius_m);
 }
 
 }  // namespace
@@ -165,14 +190,22 @@ void write_robot(const Robot& robot, const Setting& s, const std::string& out) {
 
 int main(int argc, char** argv) {
   using namespace gapfarm::truths;
-  if (argc != 6) {
-    std::fputs("usage: mujoco_ground_robot differential|skid TILT STIFFNESS SEED OUT\n", stderr);
+  if (argc != 7) {
+    std::fputs(
+        "usage: mujoco_ground_robot differential|skid tilt|edge|patch SIZE STIFFNESS SEED OUT\n",
+        stderr);
     return 2;
   }
-  std::mt19937 random(static_cast<unsigned>(std::atoi(argv[4])));
-  const std::string out = argv[5];
-  Setting setting{std::string(argv[1]) == "skid", std::atof(argv[2]), std::atof(argv[3]),
-                  std::uniform_real_distribution<double>(-pi, pi)(random)};
+  std::mt19937 random(static_cast<unsigned>(std::atoi(argv[5])));
+  const auto between = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  const std::string out = argv[6];
+  Setting setting{std::string(argv[1]) == "skid", argv[2], std::atof(argv[3]), std::atof(argv[4])};
+  setting.direction_rad = between(-pi, pi);
+  setting.x_m = between(-0.5, 0.5);
+  setting.y_m = between(-0.5, 0.5);
+  setting.radius_m = between(0.5, 0.8);
   std::filesystem::create_directories(out + "/log");
   Robot robot(setting);
   drive(robot, setting, random, out + "/log");

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <sstream>
+#include <string>
 
 #include "common/trials/files.h"
 #include "tests/integration/run_program.h"
@@ -94,24 +96,59 @@ TEST(MujocoCases, ANullsLogPassesTheCheck) {
   EXPECT_THAT(checked.out + checked.err, testing::HasSubstr("48 in 3 sessions"));
 }
 
-// The diagnosis knows neither the motors nor the contacts of this robot.
+// What a diagnosis names as `effect` of a log whose robot shares neither motors nor contacts with
+// what the diagnosis knows, and what was so.
+struct Answer {
+  nlohmann::json named;
+  std::map<std::string, double> truth;
+  std::string text;
+};
+
+Answer floor_answer(const std::string& effect, const char* kind, const char* floor,
+                    const char* size) {
+  const TemporaryFolder folder;
+  const Finished made =
+      run_program("mujoco_ground_robot", {kind, floor, size, "0.5", "7", folder / "log"});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  const Finished found =
+      gapfarm_command({"diagnose", folder / "log/config.toml", "--out", folder / "out"});
+  EXPECT_EQ(found.exit_code, 0) << found.err;
+  Answer answer{{}, {}, found.out};
+  std::istringstream truth(*read_text_file(folder / "log/truth.txt"));
+  for (std::string key; truth >> key;) truth >> answer.truth[key];
+  const auto diagnosis = nlohmann::json::parse(*read_text_file(folder / "out/diagnosis.json"));
+  for (const auto& e : diagnosis["effects"]) {
+    if (e["name"] == effect) answer.named = e["parameters"];
+  }
+  EXPECT_FALSE(answer.named.is_null()) << kind << ": " << found.out;
+  return answer;
+}
+
+double value_of(const Answer& answer, const char* key) {
+  return answer.named.is_null() ? NAN : answer.named[key]["value"].get<double>();
+}
+
 TEST(MujocoGroundRobot, ASlopeIsNamedWithTheWayDown) {
   for (const char* kind : {"differential", "skid"}) {
-    const TemporaryFolder folder;
-    const Finished made =
-        run_program("mujoco_ground_robot", {kind, "0.06", "0.5", "7", folder / "log"});
-    ASSERT_EQ(made.exit_code, 0) << made.err;
-    const Finished found =
-        gapfarm_command({"diagnose", folder / "log/config.toml", "--out", folder / "out"});
-    EXPECT_EQ(found.exit_code, 0) << found.err;
-    const auto truth = read_text_file(folder / "log/truth.txt");
-    const double downhill = std::atof(truth->c_str() + truth->find("downhill") + 8);
-    const auto diagnosis = nlohmann::json::parse(*read_text_file(folder / "out/diagnosis.json"));
-    double named = NAN;
-    for (const auto& effect : diagnosis["effects"]) {
-      if (effect["name"] == "floor_tilt") named = effect["parameters"]["direction"]["value"];
-    }
-    EXPECT_NEAR(std::remainder(named - downhill, 2 * std::numbers::pi), 0, 0.15) << found.out;
+    const Answer slope = floor_answer("floor_tilt", kind, "tilt", "0.06");
+    const double off = value_of(slope, "direction") - slope.truth.at("direction");
+    EXPECT_NEAR(std::remainder(off, 2 * std::numbers::pi), 0, 0.15) << slope.text;
+  }
+}
+
+TEST(MujocoGroundRobot, AnEdgeIsNamedWhereItIs) {
+  const Answer edge = floor_answer("floor_edge", "differential", "edge", "0.004");
+  const double way = edge.truth.at("direction");
+  EXPECT_NEAR(std::remainder(value_of(edge, "angle") - way, 2 * std::numbers::pi), 0, 0.1);
+  const double across = (value_of(edge, "x") - edge.truth.at("x")) * std::cos(way) +
+                        (value_of(edge, "y") - edge.truth.at("y")) * std::sin(way);
+  EXPECT_NEAR(across, 0, 0.03) << edge.text;
+}
+
+TEST(MujocoGroundRobot, APatchIsNamedWhereItIs) {
+  const Answer patch = floor_answer("friction_patch", "skid", "patch", "0.008");
+  for (const char* key : {"x", "y", "radius"}) {
+    EXPECT_NEAR(value_of(patch, key), patch.truth.at(key), 0.1) << key << ": " << patch.text;
   }
 }
 
