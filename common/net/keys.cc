@@ -67,7 +67,7 @@ Result<Fields> read_fields(const std::string& path, mode_t forbidden, const char
                  (errno == ENOENT ? "; see `gapfarm keys --help` for how keys are made" : "")};
   }
   struct stat found = {};
-  std::array<char, kFileLimit> bytes = {};
+  std::array<char, kFileLimit + 1> bytes = {};
   ssize_t size = -1;
   const bool sound = ::fstat(fd, &found) == 0 && S_ISREG(found.st_mode);
   if (sound) size = ::read(fd, bytes.data(), bytes.size());
@@ -78,6 +78,11 @@ Result<Fields> read_fields(const std::string& path, mode_t forbidden, const char
                  "; only keys of your own are used"};
   }
   if ((found.st_mode & forbidden) != 0) return Error{"key file '" + path + "' " + remedy};
+  if (static_cast<std::size_t>(size) > kFileLimit) {
+    return Error{"key file '" + path + "' has " + std::to_string(found.st_size) +
+                 " bytes and a key file at most " + std::to_string(kFileLimit) +
+                 "; remove its comments, or give the file that `gapfarm keys` made"};
+  }
   Fields fields = parse(std::string(bytes.data(), static_cast<std::size_t>(size)));
   sodium_memzero(bytes.data(), bytes.size());
   return fields;

@@ -60,6 +60,17 @@ TEST_F(Keys, AKeyIsNeverReplaced) {
               HasSubstr("another key"));
 }
 
+TEST_F(Keys, AFileThatIsTooLongIsRefusedAndNotCutOff) {
+  const std::string path = base_ / "long.pub";
+  const std::string key = "name w\npublic " + make_key_pair("w").public_key + "\n#";
+  std::ofstream(path) << key << std::string(4096 - key.size(), '-');
+  EXPECT_TRUE(read_public_key(path).ok());
+  std::ofstream(path) << key << std::string(4097 - key.size(), '-');
+  EXPECT_THAT(read_public_key(path).error().message,
+              testing::AllOf(HasSubstr("long.pub' has 4097 bytes"), HasSubstr("at most 4096"),
+                             HasSubstr("remove its comments")));
+}
+
 TEST_F(Keys, LoosePermissionsAreRefused) {
   const KeyFolder keys = folder();
   ASSERT_TRUE(keys.add_pair("master", make_key_pair("m")).ok());
