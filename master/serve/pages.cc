@@ -24,10 +24,11 @@ std::string spark(const std::vector<double>& values) {
   if (values.size() < 2) return "";
   std::vector<double> sorted = values;
   std::ranges::sort(sorted);
-  const double low = sorted[sorted.size() / 10], high = sorted[sorted.size() * 9 / 10];
-  const double span = sorted.back() - sorted.front();
-  if (!(span > 0)) return "";
-  const double from = low - 0.1 * (high - low), to = std::max(sorted.back(), high);
+  if (!(sorted.back() > sorted.front())) return "";
+  const double tenth = sorted[sorted.size() / 10], high = sorted[sorted.size() * 9 / 10];
+  // What rose once and stayed there is all rise.
+  const double low = tenth < sorted.back() ? tenth : sorted.front();
+  const double from = low - 0.1 * (high - low), to = sorted.back();
   std::string d;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double share = std::clamp((values[i] - from) / (to - from), 0.0, 1.0);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "master/serve/pages.h"
 #include "master/store/answer_store.h"
 #include "master/store/command_record.h"
 #include "tests/unit/store/store_fixture.h"
@@ -225,6 +226,15 @@ TEST_F(SiteTest, FiguresHaveLabels) {
   EXPECT_THAT(text, HasSubstr("gapfarm_retries_total" + label + "} 5\n"));
   EXPECT_THAT(text, HasSubstr("gapfarm_generation" + label + "} 1\n"));
   EXPECT_THAT(text, HasSubstr("gapfarm_workers" + label + ",state=\"busy\"} 1\n"));
+}
+
+TEST(ListPage, DrawsABestThatRoseOnceAndStayed) {
+  WorkEntry entry;
+  entry.best_by_generation.assign(11, 5);
+  entry.best_by_generation.front() = 0;
+  const std::string page = list_page({entry}, {}, {});
+  EXPECT_THAT(page, HasSubstr("M0 18.4L10 2.0"));
+  EXPECT_THAT(page, Not(HasSubstr(" nan")));
 }
 
 }  // namespace gapfarm::site_test
