@@ -172,6 +172,7 @@ std::vector<v1::Override> overrides_of(const ParameterValues& problem,
 
 v1::Pose to_proto(const Pose& pose);
 Pose from_proto(const v1::Pose& pose);
+v1::Command to_proto(const CommandSpec& command);
 v1::Piece to_proto(const Piece& piece);
 Piece from_proto(const v1::Piece& message);
 v1::Trial to_proto(const Trial& trial);

@@ -211,6 +211,15 @@ v1::Pose to_proto(const Pose& pose) {
 
 Pose from_proto(const v1::Pose& pose) { return {pose.x(), pose.y(), pose.theta()}; }
 
+v1::Command to_proto(const CommandSpec& command) {
+  v1::Command message;
+  message.set_name(command.name);
+  message.set_left(command.left);
+  message.set_right(command.right);
+  message.set_duration(command.duration_s);
+  return message;
+}
+
 v1::Piece to_proto(const Piece& piece) {
   v1::Piece message;
   message.set_name(piece.name);
@@ -307,13 +316,7 @@ v1::Problem to_proto(const Problem& problem) {
     to->set_upper(gene.upper);
     to->set_log_scale(gene.scale == ParameterScale::kLog);
   }
-  for (const CommandSpec& command : problem.commands) {
-    v1::Command* to = message.add_commands();
-    to->set_name(command.name);
-    to->set_left(command.left);
-    to->set_right(command.right);
-    to->set_duration(command.duration_s);
-  }
+  for (const CommandSpec& command : problem.commands) *message.add_commands() = to_proto(command);
   write_fitness(problem.fitness, message.mutable_fitness());
   message.mutable_spread()->set_kind(static_cast<v1::Spread::Kind>(problem.spread.kind));
   message.mutable_spread()->set_replicates(problem.spread.replicates);

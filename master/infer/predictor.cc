@@ -209,10 +209,7 @@ Result<std::vector<std::vector<PathSample>>> Predictor::paths(
   for (const CommandSpec& command : commands) {
     v1::TraceTask* trace = tasks.emplace_back().mutable_trace();
     fill(at, trace->mutable_point());
-    trace->mutable_command()->set_name(command.name);
-    trace->mutable_command()->set_left(command.left);
-    trace->mutable_command()->set_right(command.right);
-    trace->mutable_command()->set_duration(command.duration_s);
+    *trace->mutable_command() = to_proto(command);
     trace->set_interval(interval_s);
   }
   ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));

@@ -213,10 +213,7 @@ Result<std::vector<ConstantVelocity>> nominal_velocities(Farm& farm, const Probl
   for (const CommandSpec& command : problem.commands) {
     v1::Task task;
     v1::TraceTask* trace = task.mutable_trace();
-    trace->mutable_command()->set_name(command.name);
-    trace->mutable_command()->set_left(command.left);
-    trace->mutable_command()->set_right(command.right);
-    trace->mutable_command()->set_duration(command.duration_s);
+    *trace->mutable_command() = to_proto(command);
     trace->set_interval(0.05);
     tasks.push_back(std::move(task));
   }

@@ -39,10 +39,7 @@ v1::Task trace_task(const TraceRequest& request, const Traced& traced, std::size
   trace->mutable_stream()->set_run_seed(settings.seed);
   trace->mutable_stream()->set_birth_id(request.repeat.value_or(0));
   trace->mutable_stream()->set_replicate(index);
-  trace->mutable_command()->set_name(command.name);
-  trace->mutable_command()->set_left(command.left);
-  trace->mutable_command()->set_right(command.right);
-  trace->mutable_command()->set_duration(command.duration_s);
+  *trace->mutable_command() = to_proto(command);
   trace->set_interval(settings.interval_s);
   trace->set_noisy(request.repeat.has_value());
   trace->set_trial(traced.trial);
