@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/text.h"
+
 namespace gapfarm {
 namespace {
 
@@ -46,9 +48,7 @@ std::string nearest_word(std::string_view word, std::span<const std::string> kno
 std::string suggestion(std::string_view word, std::span<const std::string> known) {
   const std::string near = nearest_word(word, known);
   if (!near.empty()) return "; did you mean '" + near + "'?";
-  std::string text = "; known: ";
-  for (std::size_t i = 0; i < known.size(); ++i) text += (i == 0 ? "" : ", ") + known[i];
-  return text;
+  return "; known: " + joined(known);
 }
 
 }  // namespace gapfarm

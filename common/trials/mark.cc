@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "common/base/hash.h"
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -16,24 +17,16 @@ std::string name_of(const std::string& path) {
   return std::filesystem::path(path).filename().string();
 }
 
-std::string_view without_blanks(std::string_view text) {
-  constexpr const char* kBlanks = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == text.npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
-
 bool is_hash(std::string_view word) {
   return word.size() == kHashDigits && word.find_first_not_of("0123456789abcdef") == word.npos;
 }
 
 LogMark mark_of(std::string_view text) {
-  text = without_blanks(text);
+  text = trimmed(text);
   const std::size_t blank = text.find_last_of(" \t");
   const std::string_view last = blank == text.npos ? text : text.substr(blank + 1);
   if (!is_hash(last)) return {std::string(text), {}};
-  return {std::string(without_blanks(text.substr(0, text.size() - last.size()))),
-          std::string(last)};
+  return {std::string(trimmed(text.substr(0, text.size() - last.size()))), std::string(last)};
 }
 
 }  // namespace

@@ -21,12 +21,6 @@ constexpr double kGreatestCoordinate = 1e4;
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
 // Walks over the text once and cuts it into rows.
 class Cutter {
  public:

@@ -16,11 +16,6 @@ namespace {
 // Submissions in one look where the cluster takes less than is wanted at once.
 constexpr unsigned kSubmissionsALook = 64;
 
-std::string trimmed(std::string text) {
-  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
-  return text;
-}
-
 std::string user_name() {
   const passwd* entry = getpwuid(geteuid());
   return entry == nullptr ? std::to_string(geteuid()) : entry->pw_name;
@@ -28,7 +23,7 @@ std::string user_name() {
 
 // What a failed command printed.
 std::string complaint_of(const std::vector<std::string>& command, const Captured& captured) {
-  std::string output = trimmed(captured.err.empty() ? captured.out : captured.err);
+  std::string output(trimmed(captured.err.empty() ? captured.out : captured.err));
   if (captured.timed_out) output = "it did not answer in time";
   if (output.empty()) output = "it " + end_text(captured.status);
   return command.front() + ": " + output;
@@ -81,7 +76,7 @@ std::string Fleet::last_lines(const Known& known) {
   named["id"] = {known.job.id};
   named["node"] = {known.job.node};
   const auto captured = run_(expand(options_.site.log, named), "");
-  return captured && captured->succeeded() ? trimmed(captured->out) : "";
+  return captured && captured->succeeded() ? std::string(trimmed(captured->out)) : "";
 }
 
 void Fleet::end(const Known& known, std::vector<EndedJob>* ended) {

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <set>
 
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -141,12 +142,6 @@ int primitive_of(std::string_view name) {
     if (name == kPrimitives[i].name) return static_cast<int>(i);
   }
   return -1;
-}
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  if (begin == text.npos) return {};
-  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -11,14 +12,8 @@ constexpr std::string_view kBlanks = " \t\r\n";
 // Properties may name one another; deeper is a circle.
 constexpr int kDeepest = 8;
 
-std::string_view trim(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == text.npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
-
 std::optional<std::string> value_of(std::string_view inside, bool braces, const XacroNames& names) {
-  inside = trim(inside);
+  inside = trimmed(inside);
   if (braces) {
     const auto found = names.find(inside);
     if (found != names.end()) return found->second;
@@ -26,14 +21,14 @@ std::optional<std::string> value_of(std::string_view inside, bool braces, const 
   }
   const std::size_t blank = inside.find_first_of(kBlanks);
   const std::string_view word = inside.substr(0, blank);
-  const std::string_view rest = blank == inside.npos ? "" : trim(inside.substr(blank));
+  const std::string_view rest = blank == inside.npos ? "" : trimmed(inside.substr(blank));
   if (word == "arg") {
     const auto found = names.find(rest);
     if (found != names.end()) return found->second;
   }
   if (word == "optenv") {
     const std::size_t end = rest.find_first_of(kBlanks);
-    return std::string(end == rest.npos ? "" : trim(rest.substr(end)));
+    return std::string(end == rest.npos ? "" : trimmed(rest.substr(end)));
   }
   return {};
 }
@@ -103,10 +98,7 @@ std::string XmlReader::needed(const Element& element, const char* name) {
 std::string XmlReader::value_of(const Element& element) {
   std::string value = attribute(element, "value");
   if (!value.empty() || element.GetText() == nullptr) return value;
-  value = expand_xacro(element.GetText(), names_);
-  const std::size_t begin = value.find_first_not_of(" \t\r\n");
-  if (begin == value.npos) return {};
-  return value.substr(begin, value.find_last_not_of(" \t\r\n") - begin + 1);
+  return std::string(trimmed(expand_xacro(element.GetText(), names_)));
 }
 
 std::optional<std::vector<double>> XmlReader::numbers(const Element& element, const char* name,
@@ -118,8 +110,8 @@ std::optional<std::vector<double>> XmlReader::numbers(const Element& element, co
     return {};
   }
   std::vector<double> all;
-  for (std::size_t at = text.find_first_not_of(" \t\r\n"); at != text.npos;) {
-    const std::size_t end = std::min(text.find_first_of(" \t\r\n", at), text.size());
+  for (std::size_t at = text.find_first_not_of(kBlanks); at != text.npos;) {
+    const std::size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
     const auto value = parse_double(std::string_view(text).substr(at, end - at));
     if (!value || !(std::abs(*value) <= kGreatestNumber)) {
       fail(element, "found " + quoted_word(text.substr(at, end - at)) + " in '" + name +
@@ -127,7 +119,7 @@ std::optional<std::vector<double>> XmlReader::numbers(const Element& element, co
       return {};
     }
     all.push_back(*value);
-    at = text.find_first_not_of(" \t\r\n", end);
+    at = text.find_first_not_of(kBlanks, end);
   }
   if (all.size() == count) return all;
   fail(element, "found " + std::to_string(all.size()) + " numbers in '" + name + "', expected " +
