@@ -209,13 +209,11 @@ class Guess {
     if (table.type == "motive") found.up = "y";
     found.keep = column_of(table, kKeep);
     auto& columns = found.columns;
-    columns.erase(std::remove_if(columns.begin(), columns.end(),
-                                 [&](const MappedColumn& c) {
-                                   const bool part = c.role[0] == 'q' && c.role.size() == 2;
-                                   return (c.role == "z" && found.up == "z") ||
-                                          (part && found.find("theta") != nullptr);
-                                 }),
-                  columns.end());
+    const bool has_theta = found.find("theta") != nullptr;
+    std::erase_if(columns, [&](const MappedColumn& c) {
+      const bool part = c.role[0] == 'q' && c.role.size() == 2;
+      return (c.role == "z" && found.up == "z") || (part && has_theta);
+    });
     const std::string unit = length_unit(table, found);
     for (MappedColumn& c : columns) {
       if (c.role == "x" || c.role == "y" || c.role == "z") c.unit = unit;

@@ -1,10 +1,10 @@
 #include "master/io/robot_files/chassis.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <set>
 
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/urdf/urdf.h"
 
@@ -36,7 +36,7 @@ class Finder {
  public:
   Finder(const UrdfModel& model, const std::vector<DriveFacts>& facts)
       : model_(model), poses_(link_poses(model)), stated_(stated_joints(facts)), driven_(stated_) {
-    for (const UrdfActuated& actuated : model.actuated) driven_.insert(actuated.joint);
+    driven_.insert(model.actuated.begin(), model.actuated.end());
   }
 
   Result<Chassis> find() {
@@ -254,7 +254,7 @@ class Finder {
   }
 
   void drop_hanging() {
-    const auto hangs = [&](const ChassisWheel& wheel) {
+    std::erase_if(chassis_.wheels, [&](const ChassisWheel& wheel) {
       const double radius = wheel.radius_m.value_or(0);
       const double gap = wheel.centre_B_m.z() - radius - chassis_.floor_z_B_m;
       if (gap <= std::max(kHangs, kHangsShare * radius)) return false;
@@ -264,9 +264,7 @@ class Finder {
         remark(*wheel.joint, "does not reach the floor and was omitted");
       }
       return true;
-    };
-    auto& wheels = chassis_.wheels;
-    wheels.erase(std::remove_if(wheels.begin(), wheels.end(), hangs), wheels.end());
+    });
   }
 
   void find_supports() {
@@ -301,8 +299,8 @@ class Finder {
   }
 
   Error no_wheels() const {
-    std::size_t moving = 0;
-    for (const UrdfJoint& joint : model_.joints) moving += joint.type != "fixed" ? 1 : 0;
+    const auto moving = std::ranges::count_if(
+        model_.joints, [](const UrdfJoint& joint) { return joint.type != "fixed"; });
     return Error{
         model_.file + ":1: found no wheels (" + std::to_string(moving) +
         " joints move, none of them turns without end about a level axis near the floor), expected "
@@ -310,7 +308,7 @@ class Finder {
   }
 
   const UrdfModel& model_;
-  std::map<std::string, Eigen::Isometry3d, std::less<>> poses_;
+  LinkPoses poses_;
   std::set<std::string> stated_;  // by controllers of wheels
   std::set<std::string> driven_;  // these, and what transmissions drive, arms included
   Chassis chassis_;
@@ -323,9 +321,7 @@ class Finder {
 }  // namespace
 
 bool contains_any(std::string_view text, std::initializer_list<std::string_view> needles) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string lower = lowered(std::string(text));
   return std::ranges::any_of(needles,
                              [&](std::string_view word) { return lower.find(word) != lower.npos; });
 }

@@ -3,11 +3,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -135,9 +135,7 @@ bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::s
 }
 
 std::string drive_of_type(std::string_view type) {
-  std::string lower(type);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string lower = lowered(std::string(type));
   for (const TypeWord& row : kTypes) {
     if (lower.find(row.word) != lower.npos) return row.drive;
   }
@@ -214,12 +212,11 @@ class YamlReader {
     collect_drives(root, 0);
     if (error_) return *error_;
     if (!read_.drives.empty()) return std::move(read_);
-    std::string there;
-    for (const std::string& name : read_.left) there += (there.empty() ? "" : ", ") + name;
-    return Error{read_.file + ":1: found " +
-                 (there.empty() ? "no controllers" : "only the controllers " + there) +
-                 ", expected one that drives wheels (wheel_separation, wheelbase, ...); give the "
-                 "file of its parameters"};
+    return Error{
+        read_.file + ":1: found " +
+        (read_.left.empty() ? "no controllers" : "only the controllers " + joined(read_.left)) +
+        ", expected one that drives wheels (wheel_separation, wheelbase, ...); give the "
+        "file of its parameters"};
   }
 
  private:

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/svg/svg.h"
 #include "master/io/robot_files/robot_text.h"
@@ -44,9 +45,8 @@ class Picture {
     Svg svg(width_, height_);
     heading(svg);
     for (const RobotOutline& outline : reading_.outlines) {
-      std::vector<SvgPoint> corners;
-      for (const Eigen::Vector2d& corner : outline.corners_R_m) corners.push_back(at(corner));
-      svg.polyline(corners, {"#e5e7eb", "#c3c8d0", 1, {}, 0.5}, true);
+      const auto corner = [this](const Eigen::Vector2d& p_R) { return at(p_R); };
+      svg.polyline(mapped(outline.corners_R_m, corner), {"#e5e7eb", "#c3c8d0", 1, {}, 0.5}, true);
     }
     axles(svg);
     for (const RobotWheel& wheel : r_.wheels) draw_wheel(svg, wheel);

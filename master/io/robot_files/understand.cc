@@ -275,7 +275,7 @@ class Understanding {
 
   const UrdfModel& model_;
   std::vector<DriveFacts> facts_;
-  std::map<std::string, Eigen::Isometry3d, std::less<>> poses_;
+  LinkPoses poses_;
   Chassis chassis_;
   RobotReading reading_;
   double forward_ = 0;  // of R's x in B, rad

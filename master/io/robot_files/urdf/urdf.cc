@@ -165,10 +165,10 @@ Result<UrdfModel> parse_urdf(std::string_view text, const std::string& file) {
   return model;
 }
 
-std::map<std::string, Eigen::Isometry3d, std::less<>> link_poses(const UrdfModel& model) {
+LinkPoses link_poses(const UrdfModel& model) {
   std::multimap<std::string_view, const UrdfJoint*> below;
   for (const UrdfJoint& joint : model.joints) below.emplace(joint.parent, &joint);
-  std::map<std::string, Eigen::Isometry3d, std::less<>> poses;
+  LinkPoses poses;
   std::vector<std::string> open = {model.root};
   poses[model.root] = Eigen::Isometry3d::Identity();
   while (!open.empty()) {
@@ -284,9 +284,9 @@ Eigen::Vector3d lowest_point(const Eigen::Isometry3d& X_BL, const UrdfGeometry& 
 }
 
 std::vector<Eigen::Vector2d> outline(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape) {
-  std::vector<Eigen::Vector2d> flat;
-  for (const Eigen::Vector3d& point : hull_points(X_BL, shape)) flat.push_back(point.head<2>());
-  return convex_hull(std::move(flat));
+  return convex_hull(
+      mapped(hull_points(X_BL, shape),
+             [](const Eigen::Vector3d& point) -> Eigen::Vector2d { return point.head<2>(); }));
 }
 
 }  // namespace gapfarm

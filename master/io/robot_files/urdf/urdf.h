@@ -50,8 +50,7 @@ struct UrdfJoint {
   bool axis_given = false;
   std::optional<double> lower_rad;
   std::optional<double> upper_rad;
-  std::optional<double> velocity_limit;  // rad/s
-  std::string unread;                    // an expression in its place or axis; empty: none
+  std::string unread;  // an expression in its place or axis; empty: none
   int line = 0;
 };
 
@@ -60,8 +59,6 @@ struct UrdfSurface {
   std::string link;
   std::optional<double> mu1;
   std::optional<double> mu2;
-  std::string fdir1;  // as written
-  int line = 0;
 };
 
 struct UrdfParameter {
@@ -74,13 +71,6 @@ struct UrdfPlugin {
   std::string name;
   std::string file;
   std::vector<UrdfParameter> parameters;  // in the file's order; keys may repeat
-  int line = 0;
-};
-
-// A joint that a <transmission> or a <ros2_control> drives.
-struct UrdfActuated {
-  std::string joint;
-  std::string interface;  // velocity, position, effort or as written
   int line = 0;
 };
 
@@ -98,7 +88,7 @@ struct UrdfModel {
   std::vector<UrdfJoint> joints;
   std::vector<UrdfSurface> surfaces;
   std::vector<UrdfPlugin> plugins;
-  std::vector<UrdfActuated> actuated;
+  std::vector<std::string> actuated;  // joints that a <transmission> or a <ros2_control> drives
   std::vector<UrdfNote> notes;
 
   const UrdfLink* find_link(std::string_view name) const;
@@ -112,11 +102,10 @@ struct UrdfModel {
 // prefixes without a declaration are read over; both become notes.
 Result<UrdfModel> parse_urdf(std::string_view text, const std::string& file);
 
-// Poses of every link in the root's frame with all joints at zero, by link name.
-// REQUIRES: `model` came from parse_urdf.
-std::map<std::string, Eigen::Isometry3d, std::less<>> link_poses(const UrdfModel& model);
-
+// In the root's frame with all joints at zero, by link name.
 using LinkPoses = std::map<std::string, Eigen::Isometry3d, std::less<>>;
+// Of every link.  REQUIRES: `model` came from parse_urdf.
+LinkPoses link_poses(const UrdfModel& model);
 
 struct RoundShape {
   double radius_m = 0;

@@ -28,8 +28,7 @@ class Reader : private XmlReader {
   void read_joint(const XMLElement& element);
   void read_gazebo(const XMLElement& element);
   void read_plugin(const XMLElement& element);
-  void read_transmission(const XMLElement& element);
-  void read_ros2_control(const XMLElement& element);
+  void read_driven(const XMLElement& element, bool ros2_control);
   void read_child(const XMLElement& element);
   Status check_root(const XMLElement* root);
 
@@ -140,7 +139,6 @@ void Reader::read_joint(const XMLElement& element) {
   if (const XMLElement* limit = element.FirstChildElement("limit")) {
     joint.lower_rad = optional_number(*limit, "lower");
     joint.upper_rad = optional_number(*limit, "upper");
-    joint.velocity_limit = optional_number(*limit, "velocity");
   }
   model_.joints.push_back(std::move(joint));
 }
@@ -162,7 +160,6 @@ void Reader::read_gazebo(const XMLElement& element) {
   const std::string reference = attribute(element, "reference");
   UrdfSurface surface;
   surface.link = reference;
-  surface.line = element.GetLineNum();
   bool any = false;
   for (const XMLElement* child = element.FirstChildElement(); child != nullptr;
        child = child->NextSiblingElement()) {
@@ -173,37 +170,17 @@ void Reader::read_gazebo(const XMLElement& element) {
       if (value && std::isfinite(*value)) (name == "mu1" ? surface.mu1 : surface.mu2) = *value;
       any = true;
     }
-    if (name == "fdir1") {
-      surface.fdir1 = value_of(*child);
-      any = true;
-    }
   }
   if (any && !reference.empty()) model_.surfaces.push_back(std::move(surface));
 }
 
-void Reader::read_transmission(const XMLElement& element) {
+void Reader::read_driven(const XMLElement& element, bool ros2_control) {
   for (const XMLElement* joint = element.FirstChildElement("joint"); joint != nullptr;
        joint = joint->NextSiblingElement("joint")) {
-    UrdfActuated actuated;
-    actuated.line = joint->GetLineNum();
-    actuated.joint = attribute(*joint, "name");
-    if (const XMLElement* interface = joint->FirstChildElement("hardwareInterface")) {
-      actuated.interface = value_of(*interface);
-    }
-    if (!actuated.joint.empty()) model_.actuated.push_back(std::move(actuated));
-  }
-}
-
-void Reader::read_ros2_control(const XMLElement& element) {
-  for (const XMLElement* joint = element.FirstChildElement("joint"); joint != nullptr;
-       joint = joint->NextSiblingElement("joint")) {
-    const XMLElement* command = joint->FirstChildElement("command_interface");
-    if (command == nullptr) continue;  // watched, not driven
-    UrdfActuated actuated;
-    actuated.line = joint->GetLineNum();
-    actuated.joint = attribute(*joint, "name");
-    actuated.interface = attribute(*command, "name");
-    if (!actuated.joint.empty()) model_.actuated.push_back(std::move(actuated));
+    // One that is without is watched, not driven.
+    if (ros2_control && joint->FirstChildElement("command_interface") == nullptr) continue;
+    std::string name = attribute(*joint, "name");
+    if (!name.empty()) model_.actuated.push_back(std::move(name));
   }
 }
 
@@ -249,10 +226,8 @@ void Reader::read_child(const XMLElement& element) {
     read_joint(element);
   } else if (name == "gazebo") {
     read_gazebo(element);
-  } else if (name == "transmission") {
-    read_transmission(element);
-  } else if (name == "ros2_control") {
-    read_ros2_control(element);
+  } else if (name == "transmission" || name == "ros2_control") {
+    read_driven(element, name == "ros2_control");
   } else if (name.substr(0, 6) == "xacro:" && name != "xacro:arg" && name != "xacro:property") {
     fail(element, "found <" + std::string(name) + ">, expected a URDF without macros; " + kExpand);
   }
