@@ -18,12 +18,10 @@ std::string first_blob(const SqlStatement& row) {
 }
 
 Status check_identity(const Database& database) {
-  ASSIGN_OR_RETURN(const auto id, database.integer("PRAGMA application_id", "read the answers"));
-  ASSIGN_OR_RETURN(const auto tables,
-                   database.integer("SELECT count(*) FROM sqlite_master", "read the answers"));
-  if (id == kAnswerStoreApplicationId || (id == 0 && tables == 0)) return {};
+  ASSIGN_OR_RETURN(const auto is, database.identity("read the answers"));
+  if (is.application == kAnswerStoreApplicationId || is.empty) return {};
   return Error{database.file().string() + ": is a SQLite file of another kind (application id " +
-               std::to_string(id) + "); take another folder, or move the file away"};
+               std::to_string(is.application) + "); take another folder, or move the file away"};
 }
 
 constexpr double kFlushInterval_s = 1;  // each costs a disk write

@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
@@ -53,13 +52,6 @@ constexpr auto kRecord = [](auto& v, auto& row) {
   FIELDS(pid, host, arguments);
 };
 
-bool lives(const std::filesystem::path& folder, const CommandRecord& record, double now_unix_s) {
-  const std::optional<bool> held = run_lock_held(folder);
-  if (held.value_or(false)) return true;
-  const bool blind = !held || record.host != host_name();
-  return blind && now_unix_s - record.heartbeat_unix_s < kFreshRecord_s;
-}
-
 }  // namespace
 
 std::filesystem::path answer_file(const std::filesystem::path& folder) {
@@ -97,7 +89,8 @@ Result<std::optional<CommandRecord>> command_status(const std::filesystem::path&
   ASSIGN_OR_RETURN(const auto text, read_command(answer_file(folder)));
   if (!text) return std::optional<CommandRecord>();
   CommandRecord record = command_record_of(parse_json(*text));
-  if (record.state == "running" && !lives(folder, record, now_unix_s)) {
+  const double age_s = now_unix_s - record.heartbeat_unix_s;
+  if (record.state == "running" && !holder_lives(folder, record.host, age_s, kFreshRecord_s)) {
     record.state = "stopped";
     record.reason = "crashed: process " + std::to_string(record.pid) + " on " + record.host +
                     " is gone without a word";

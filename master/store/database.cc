@@ -184,6 +184,12 @@ Result<std::int64_t> Database::integer(const std::string& sql, const std::string
   return found.value_or(0);
 }
 
+Result<Database::Identity> Database::identity(const std::string& operation) const {
+  ASSIGN_OR_RETURN(const auto id, integer("PRAGMA application_id", operation));
+  ASSIGN_OR_RETURN(const auto tables, integer("SELECT count(*) FROM sqlite_master", operation));
+  return Identity{id, id == 0 && tables == 0};
+}
+
 Result<SqlTransaction> SqlTransaction::begin(Database& database) {
   RETURN_IF_ERROR(database.exec("BEGIN IMMEDIATE", "begin a transaction"));
   return SqlTransaction(database);

@@ -149,6 +149,12 @@ class Database {
     ASSIGN_OR_RETURN(const auto there, statement->bind_all(values...).step());
     return there ? Row(read(*statement)) : Row();
   }
+  // What kind of file it is: its application's id, and whether anything is in it.
+  struct Identity {
+    std::int64_t application = 0;
+    bool empty = false;  // neither an id nor a table
+  };
+  Result<Identity> identity(const std::string& operation) const;
   // The only value of a statement's only row.
   Result<std::int64_t> integer(const std::string& sql, const std::string& operation) const;
 

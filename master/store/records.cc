@@ -20,9 +20,14 @@ const char* run_state_name(RunState state) {
   return kNames[static_cast<std::size_t>(state)];
 }
 
-std::string farm_json(const FarmTally& tally, const Progress& progress) {
+Json to_json(const FarmTally& tally) {
   Json json = Json::object();
   for (const FarmTally::Row& row : FarmTally::kRows) json[row.key] = tally.*row.count;
+  return json;
+}
+
+std::string farm_json(const FarmTally& tally, const Progress& progress) {
+  Json json = to_json(tally);
   if (!progress.listen.empty()) json["listen"] = progress.listen;
   if (!progress.fleets.empty()) json["fleets"] = fleets_json(progress.fleets);
   return json_text(json);
@@ -129,9 +134,7 @@ std::vector<double> turned(const RunFront& front, std::vector<double> values) {
 }  // namespace
 
 std::vector<double> RunFront::costs(const StoredIndividual& member) const {
-  std::vector<double> values;
-  for (const auto& [name, value] : member.objectives) values.push_back(value);
-  return turned(*this, std::move(values));
+  return turned(*this, mapped(member.objectives, &NamedValue::second));
 }
 
 Result<RunFront> run_front(const RunReader& reader,

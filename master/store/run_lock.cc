@@ -80,6 +80,13 @@ std::optional<bool> run_lock_held(const std::filesystem::path& run) {
   return request.l_type != F_UNLCK;
 }
 
+bool holder_lives(const std::filesystem::path& run, const std::string& host, double heartbeat_age_s,
+                  double fresh_s) {
+  const std::optional<bool> held = run_lock_held(run);
+  if (held.value_or(false)) return true;
+  return (!held || host != host_name()) && heartbeat_age_s < fresh_s;
+}
+
 double unix_now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }

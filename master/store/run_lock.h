@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "common/base/result.h"
 
@@ -27,6 +28,11 @@ class RunLock {
 // Whether some process holds the lock of `run`; none when the file system does not know.  Takes
 // nothing and writes nothing, so it works on a read-only folder and never disturbs a master.
 std::optional<bool> run_lock_held(const std::filesystem::path& run);
+
+// Whether who holds `run` on `host` lives: by its lock or, where this machine cannot see the lock
+// (another host, a mount without locks), by a heartbeat younger than `fresh_s`.
+bool holder_lives(const std::filesystem::path& run, const std::string& host, double heartbeat_age_s,
+                  double fresh_s);
 
 // Seconds since 1970: for people, never for results.
 double unix_now_s();

@@ -3,7 +3,6 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
@@ -16,7 +15,6 @@ namespace {
 constexpr std::int64_t kSchemaWithIncidents = 2;
 constexpr std::int64_t kSchemaWithDocuments = 3;
 constexpr std::int64_t kSchemaWithWorkerEvents = 4;
-
 constexpr std::int64_t kSchemaWithObjectives = 5;
 
 std::vector<double> genome_of(const std::string& blob) {
@@ -79,10 +77,7 @@ bool master_lives(const RunReader& reader, const Progress& progress, double hear
   if (progress.state != RunState::kRunning) return false;
   // A kept copy of a store has no master of its own.
   if (!std::filesystem::is_directory(reader.run())) return false;
-  const std::optional<bool> held = run_lock_held(reader.run());
-  if (held.value_or(false)) return true;
-  const bool blind = !held || progress.host != host_name();
-  return blind && heartbeat_age_s < kFreshHeartbeat_s;
+  return holder_lives(reader.run(), progress.host, heartbeat_age_s, kFreshHeartbeat_s);
 }
 
 Json to_json(const Incident& incident) {
@@ -342,10 +337,7 @@ Json to_json(const RunStatus& status) {
   json["quarantined"] = status.quarantined;
   Json& incidents = json["incidents"] = Json::array();
   for (const Incident& incident : status.incidents) incidents.push_back(to_json(incident));
-  Json& farm = json["farm"] = Json::object();
-  for (const FarmTally::Row& row : FarmTally::kRows) {
-    farm[row.key] = status.progress.farm.*row.count;
-  }
+  json["farm"] = to_json(status.progress.farm);
   json["fleets"] = fleets_json(status.progress.fleets);
   json["fitness"] = status.info.fitness;
   json["fitness_unit"] = status.info.fitness_unit;

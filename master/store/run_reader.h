@@ -116,6 +116,7 @@ Json workers_json(const std::vector<WorkerStatus>& workers);
 std::vector<WorkerStatus> workers_of(const Json& json);
 Json fleets_json(const std::vector<FleetStatus>& fleets);
 std::vector<FleetStatus> fleets_of(const Json& json);
+Json to_json(const FarmTally& tally);
 Json to_json(const RunStatus& status);
 
 }  // namespace gapfarm

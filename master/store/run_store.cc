@@ -84,9 +84,8 @@ bool is_unborn(const fs::path& file) {
   if (!fs::exists(file, code) || fs::file_size(file, code) == 0) return true;
   const Result<Database> database = Database::open(file, Database::Mode::kQueryOnly);
   if (!database) return false;
-  const auto tables = database->integer("SELECT count(*) FROM sqlite_master", "look");
-  const auto id = database->integer("PRAGMA application_id", "look");
-  return tables && id && *tables == 0 && *id == 0;
+  const auto is = database->identity("look");
+  return is && is->empty;
 }
 
 }  // namespace

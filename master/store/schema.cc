@@ -54,16 +54,13 @@ Status check_run_store(const Database& database) {
   if (std::filesystem::file_size(database.file(), ignored) == 0 && !ignored) {
     return Error{file + ": is empty: creating the run was interrupted; delete it and start again"};
   }
-  ASSIGN_OR_RETURN(const std::int64_t tables,
-                   database.integer("SELECT count(*) FROM sqlite_master", "read the run store"));
-  ASSIGN_OR_RETURN(const std::int64_t id,
-                   database.integer("PRAGMA application_id", "read the run store"));
-  if (id == 0 && tables == 0) {
+  ASSIGN_OR_RETURN(const auto is, database.identity("read the run store"));
+  if (is.empty) {
     return Error{file + ": has no tables: creating the run was interrupted; start it again"};
   }
-  if (id != kRunStoreApplicationId) {
+  if (is.application != kRunStoreApplicationId) {
     return Error{file + ": is a SQLite file of another program (application id " +
-                 std::to_string(id) + ", a run store has " +
+                 std::to_string(is.application) + ", a run store has " +
                  std::to_string(kRunStoreApplicationId) + "); give the folder of a gapfarm run"};
   }
   ASSIGN_OR_RETURN(const std::int64_t schema, run_store_schema(database));
