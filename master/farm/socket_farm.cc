@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <map>
 #include <random>
 
 #include "common/base/build_info.h"
@@ -44,150 +43,121 @@ std::uint64_t unique_epoch(std::uint64_t count) {
 
 }  // namespace
 
-struct SocketFarm::Impl {
-  SocketFarmOptions options;
-  // Ends in the reverse order: workers first, then the socket, then the folder it lives in.
-  std::unique_ptr<PrivateFolder> folder;
-  std::unique_ptr<RouterSocket> socket;
-  std::unique_ptr<LocalWorkers> locals;
-  std::unique_ptr<Scheduler> scheduler;
-  std::vector<std::string> endpoints;
-  std::string last_trouble;                       // why workers do not come
-  std::map<std::string, std::string> unsendable;  // problems by hash: what is wrong
-  double next_reap = 0;
-  bool unanswered = false;  // what was asked last was stopped, or failed
+SocketFarm::SocketFarm(SocketFarmOptions options) : options_(std::move(options)) {}
 
-  Status open();
-  Status open_local();
-  void on_event(const FarmEvent& event);
-  void reap(double now);
-  Status workers_can_be_had();
-  void sleep(double now);
-  Status check(const std::vector<v1::Task>& tasks) const;
-  // `on_round` (may be empty) is called after messages were taken; true: there are more tasks.
-  Status loop(const std::function<void(const FarmProgress&)>& on_progress,
-              const std::function<Result<bool>()>& on_round);
-  Result<std::vector<v1::TaskResult>> ask(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress,
-      const std::function<Result<bool>()>& on_round = {});
-};
-
-void SocketFarm::Impl::on_event(const FarmEvent& event) {
-  if (event.kind == FarmEvent::kJoined && locals) locals->pool().confirm(event.worker);
-  if (event.kind == FarmEvent::kRefused) last_trouble = event.text;
-  (options.on_event ? options.on_event : complain)(event);
+Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options) {
+  std::unique_ptr<SocketFarm> farm(new SocketFarm(std::move(options)));
+  RETURN_IF_ERROR(farm->open());
+  return farm;
 }
 
-Status SocketFarm::Impl::open() {
-  if (options.local_workers == 0 && options.listen.empty()) {
+void SocketFarm::on_event(const FarmEvent& event) {
+  if (event.kind == FarmEvent::kJoined && locals_) locals_->pool().confirm(event.worker);
+  if (event.kind == FarmEvent::kRefused) last_trouble_ = event.text;
+  (options_.on_event ? options_.on_event : complain)(event);
+}
+
+Status SocketFarm::open() {
+  if (options_.local_workers == 0 && options_.listen.empty()) {
     return Error{"the farm has no local workers and listens nowhere; give it one or the other"};
   }
-  SchedulerOptions settings = options;
-  settings.epoch = unique_epoch(options.epoch);
+  SchedulerOptions settings = options_;
+  settings.epoch = unique_epoch(options_.epoch);
   settings.admittance.fingerprint = build_info().fingerprint;
   settings.on_event = [this](const FarmEvent& event) { on_event(event); };
-  scheduler = std::make_unique<Scheduler>(std::move(settings));
+  scheduler_ = std::make_unique<Scheduler>(std::move(settings));
 
   SocketOptions links;
-  links.security = options.security;
-  links.limits = options.limits;
+  links.security = options_.security;
+  links.limits = options_.limits;
   ASSIGN_OR_RETURN(auto made, RouterSocket::create(links));
-  socket = std::move(made);
-  for (const std::string& endpoint : options.listen) {
-    ASSIGN_OR_RETURN(auto bound, socket->bind(endpoint));
-    endpoints.push_back(bound);
+  socket_ = std::move(made);
+  for (const std::string& endpoint : options_.listen) {
+    ASSIGN_OR_RETURN(auto bound, socket_->bind(endpoint));
+    endpoints_.push_back(bound);
   }
-  return options.local_workers > 0 ? open_local() : Status{};
+  return options_.local_workers > 0 ? open_local() : Status{};
 }
 
-Status SocketFarm::Impl::open_local() {
-  ASSIGN_OR_RETURN(auto program, options.worker_program.empty()
+Status SocketFarm::open_local() {
+  ASSIGN_OR_RETURN(auto program, options_.worker_program.empty()
                                      ? find_worker_program()
-                                     : Result<std::string>(options.worker_program));
+                                     : Result<std::string>(options_.worker_program));
   ASSIGN_OR_RETURN(auto made, PrivateFolder::make());
-  folder = std::move(made);
-  ASSIGN_OR_RETURN(auto endpoint, socket->bind("ipc://" + folder->socket_path()));
-  locals = std::make_unique<LocalWorkers>(program, options.local_workers, endpoint,
-                                          options.local_limits);
-  return locals->start();
+  folder_ = std::move(made);
+  ASSIGN_OR_RETURN(auto endpoint, socket_->bind("ipc://" + folder_->socket_path()));
+  locals_ = std::make_unique<LocalWorkers>(program, options_.local_workers, endpoint,
+                                           options_.local_limits);
+  return locals_->start();
 }
 
-void SocketFarm::Impl::reap(double now) {
-  next_reap = now + kReapInterval;
-  for (std::string& text : socket->take_complaints()) {
+void SocketFarm::reap(double now) {
+  next_reap_ = now + kReapInterval;
+  for (std::string& text : socket_->take_complaints()) {
     on_event({FarmEvent::kRefused, "", std::move(text), ""});
   }
-  if (!locals) return;
-  for (const ProcessEnded& end : locals->pool().reap(now)) {
-    scheduler->on_process_end(end);
+  if (!locals_) return;
+  for (const ProcessEnded& end : locals_->pool().reap(now)) {
+    scheduler_->on_process_end(end);
     if (end.gave_up) {
-      if (last_trouble.empty()) last_trouble = end.text;
+      if (last_trouble_.empty()) last_trouble_ = end.text;
       on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again", ""});
     }
   }
 }
 
-Status SocketFarm::Impl::workers_can_be_had() {
-  if (!options.listen.empty() || !locals || !locals->pool().exhausted()) return {};
-  return Error{"no worker can be had: " + last_trouble};
+Status SocketFarm::workers_can_be_had() {
+  if (!options_.listen.empty() || !locals_ || !locals_->pool().exhausted()) return {};
+  return Error{"no worker can be had: " + last_trouble_};
 }
 
-void SocketFarm::Impl::sleep(double now) {
+void SocketFarm::sleep(double now) {
   std::vector<int> fds;
-  if (locals) fds = locals->pool().fds();
-  if (options.stop != nullptr) fds.push_back(options.stop->fd());
-  double until = now + std::min(options.heartbeat_interval_s, kProgressInterval);
-  if (locals) {
-    until = std::min({until, locals->pool().next_start(), now + locals->pool().look_interval()});
+  if (locals_) fds = locals_->pool().fds();
+  if (options_.stop != nullptr) fds.push_back(options_.stop->fd());
+  double until = now + std::min(options_.heartbeat_interval_s, kProgressInterval);
+  if (locals_) {
+    until = std::min({until, locals_->pool().next_start(), now + locals_->pool().look_interval()});
   }
-  socket->wait(fds, std::max(0.0, until - now));
+  socket_->wait(fds, std::max(0.0, until - now));
 }
 
-Status SocketFarm::Impl::loop(const std::function<void(const FarmProgress&)>& on_progress,
-                              const std::function<Result<bool>()>& on_round) {
+Status SocketFarm::loop(const std::function<void(const FarmProgress&)>& on_progress,
+                        const std::function<Result<bool>()>& on_round) {
   double next_progress = 0;
   bool busy = false;
   for (;;) {
-    if (options.stop != nullptr && options.stop->requested()) return stop_requested();
+    if (options_.stop != nullptr && options_.stop->requested()) return stop_requested();
     const double now = monotonic_seconds();
-    if (!busy || now >= next_reap) reap(now);
-    busy = pump(*socket, *scheduler, now);
+    if (!busy || now >= next_reap_) reap(now);
+    busy = pump(*socket_, *scheduler_, now);
     if (on_round) {
       ASSIGN_OR_RETURN(const bool more, on_round());
       busy |= more;
     }
-    if (scheduler->finished()) break;
+    if (scheduler_->finished()) break;
     if (on_progress && now >= next_progress) {
-      on_progress(scheduler->progress());
+      on_progress(scheduler_->progress());
       next_progress = now + kProgressInterval;
     }
     RETURN_IF_ERROR(workers_can_be_had());
     if (!busy) sleep(now);
   }
-  if (on_progress) on_progress(scheduler->progress());
+  if (on_progress) on_progress(scheduler_->progress());
   return {};
 }
 
-SocketFarm::SocketFarm(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-
-Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options) {
-  auto impl = std::make_unique<Impl>();
-  impl->options = std::move(options);
-  RETURN_IF_ERROR(impl->open());
-  return std::unique_ptr<SocketFarm>(new SocketFarm(std::move(impl)));
-}
-
 SocketFarm::~SocketFarm() {
-  const bool stopped = impl_->options.stop != nullptr && impl_->options.stop->requested();
-  const bool over = !stopped && !impl_->unanswered;
-  impl_->scheduler->send_goodbye(over ? "the run is over" : "the run was stopped", over);
+  if (!socket_) return;  // open() failed before there was one
+  const bool stopped = options_.stop != nullptr && options_.stop->requested();
+  const bool over = !stopped && !unanswered_;
+  scheduler_->send_goodbye(over ? "the run is over" : "the run was stopped", over);
   // A peer loses what it has not read when the connection ends, so that waits for their answers.
   const double until = monotonic_seconds() + kFarewellLimit_s;
-  for (double now = 0; now < until; impl_->socket->wait({}, std::max(0.0, until - now))) {
+  for (double now = 0; now < until; socket_->wait({}, std::max(0.0, until - now))) {
     now = monotonic_seconds();
-    pump(*impl_->socket, *impl_->scheduler, now);
-    if (impl_->scheduler->goodbye_is_answered()) break;
+    pump(*socket_, *scheduler_, now);
+    if (scheduler_->goodbye_is_answered()) break;
   }
 }
 
@@ -201,12 +171,12 @@ Status check_sendable(const v1::Problem& problem) {
 std::string SocketFarm::add_problem(const v1::Problem& problem) {
   std::string bytes = serialise(problem);
   std::string hash = problem_hash(problem);
-  if (Status s = check_sendable(problem); !s) impl_->unsendable[hash] = s.error().message;
-  impl_->scheduler->add_problem(hash, std::move(bytes));
+  if (Status s = check_sendable(problem); !s) unsendable_[hash] = s.error().message;
+  scheduler_->add_problem(hash, std::move(bytes));
   return hash;
 }
 
-Status SocketFarm::Impl::check(const std::vector<v1::Task>& tasks) const {
+Status SocketFarm::check(const std::vector<v1::Task>& tasks) const {
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     const std::size_t size = tasks[i].ByteSizeLong();
     if (size <= kMaxMessageBytes / 2) continue;
@@ -217,29 +187,29 @@ Status SocketFarm::Impl::check(const std::vector<v1::Task>& tasks) const {
   return {};
 }
 
-Result<std::vector<v1::TaskResult>> SocketFarm::Impl::ask(
+Result<std::vector<v1::TaskResult>> SocketFarm::ask(
     const std::string& problem_hash, const std::vector<v1::Task>& tasks,
     const std::function<void(const FarmProgress&)>& on_progress,
     const std::function<Result<bool>()>& on_round) {
-  if (const auto found = unsendable.find(problem_hash); found != unsendable.end()) {
+  if (const auto found = unsendable_.find(problem_hash); found != unsendable_.end()) {
     return Error{found->second};
   }
   RETURN_IF_ERROR(check(tasks));
-  scheduler->start(problem_hash, tasks);
+  scheduler_->start(problem_hash, tasks);
   const Status status = loop(on_progress, on_round);
-  unanswered = !status;
+  unanswered_ = !status;
   if (!status) {
-    scheduler->abandon();
-    pump(*socket, *scheduler, monotonic_seconds());
+    scheduler_->abandon();
+    pump(*socket_, *scheduler_, monotonic_seconds());
     return status.error();
   }
-  return scheduler->finish();
+  return scheduler_->finish();
 }
 
 Result<std::vector<v1::TaskResult>> SocketFarm::run(
     const std::string& problem_hash, const std::vector<v1::Task>& tasks,
     const std::function<void(const FarmProgress&)>& on_progress) {
-  return impl_->ask(problem_hash, tasks, on_progress);
+  return ask(problem_hash, tasks, on_progress);
 }
 
 Status SocketFarm::stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
@@ -247,32 +217,22 @@ Status SocketFarm::stream(const std::string& problem_hash, std::vector<v1::Task>
                           const std::function<void(const FarmProgress&)>& on_progress) {
   const auto on_round = [&]() -> Result<bool> {
     std::vector<v1::Task> more;
-    for (const auto& [place, result] : impl_->scheduler->take_answers()) {
+    for (const auto& [place, result] : scheduler_->take_answers()) {
       ASSIGN_OR_RETURN(auto next, take(place, result));
       std::move(next.begin(), next.end(), std::back_inserter(more));
     }
-    RETURN_IF_ERROR(impl_->check(more));
+    RETURN_IF_ERROR(check(more));
     const bool some = !more.empty();
-    if (some) impl_->scheduler->append(std::move(more));
+    if (some) scheduler_->append(std::move(more));
     return some;
   };
-  const auto results = impl_->ask(problem_hash, tasks, on_progress, on_round);
+  const auto results = ask(problem_hash, tasks, on_progress, on_round);
   return results ? Status() : Status(results.error());
 }
 
-void SocketFarm::watch_answers(AnswerWatcher watcher) {
-  impl_->scheduler->watch_answers(std::move(watcher));
-}
-
-std::vector<WorkerStatus> SocketFarm::workers() const { return impl_->scheduler->worker_status(); }
-
-std::vector<FleetStatus> SocketFarm::fleets() const { return impl_->scheduler->fleet_status(); }
-
-std::vector<std::string> SocketFarm::endpoints() const { return impl_->endpoints; }
-
 FarmTally SocketFarm::tally() const {
-  FarmTally tally = impl_->scheduler->tally();
-  const LinkCounts links = impl_->socket->link_counts();
+  FarmTally tally = scheduler_->tally();
+  const LinkCounts links = socket_->link_counts();
   tally.links = links.accepted;
   tally.refused_keys = links.refused_keys;
   tally.failed_handshakes = links.failed_handshakes;
@@ -280,18 +240,8 @@ FarmTally SocketFarm::tally() const {
   return tally;
 }
 
-std::uint64_t SocketFarm::given_up() const { return impl_->scheduler->given_up(); }
-
-std::string SocketFarm::numeric_class() const {
-  return impl_->scheduler->workers().numeric_class();
-}
-
-const std::deque<std::string>& SocketFarm::quarantine_reasons() const {
-  return impl_->scheduler->quarantine_reasons();
-}
-
 std::vector<int> SocketFarm::local_pids() const {
-  return impl_->locals ? impl_->locals->pool().pids() : std::vector<int>{};
+  return locals_ ? locals_->pool().pids() : std::vector<int>{};
 }
 
 namespace {

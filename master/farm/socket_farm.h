@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,9 @@
 #include "master/farm/scheduler.h"
 
 namespace gapfarm {
+
+class LocalWorkers;
+class PrivateFolder;
 
 // Of the scheduler's the epoch counts lives of the master so far, below 2^24; the build's
 // fingerprint is filled in; without `on_event` what went wrong goes to stderr.
@@ -52,23 +56,52 @@ class SocketFarm : public Farm {
                 const TakeAnswer& take,
                 const std::function<void(const FarmProgress&)>& on_progress = {}) override;
 
-  void watch_answers(AnswerWatcher watcher) override;
-  std::vector<WorkerStatus> workers() const override;
-  std::vector<FleetStatus> fleets() const override;
-  std::vector<std::string> endpoints() const override;
+  void watch_answers(AnswerWatcher watcher) override {
+    scheduler_->watch_answers(std::move(watcher));
+  }
+  std::vector<WorkerStatus> workers() const override { return scheduler_->worker_status(); }
+  std::vector<FleetStatus> fleets() const override { return scheduler_->fleet_status(); }
+  std::vector<std::string> endpoints() const override { return endpoints_; }
   FarmTally tally() const override;
-  std::uint64_t given_up() const override;
-  std::string numeric_class() const override;
+  std::uint64_t given_up() const override { return scheduler_->given_up(); }
+  std::string numeric_class() const override { return scheduler_->workers().numeric_class(); }
 
   // See Scheduler.
-  const std::deque<std::string>& quarantine_reasons() const;
+  const std::deque<std::string>& quarantine_reasons() const {
+    return scheduler_->quarantine_reasons();
+  }
   // Pids of the running local workers.
   std::vector<int> local_pids() const;
 
  private:
-  struct Impl;
-  explicit SocketFarm(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  explicit SocketFarm(SocketFarmOptions options);
+
+  Status open();
+  Status open_local();
+  void on_event(const FarmEvent& event);
+  void reap(double now);
+  Status workers_can_be_had();
+  void sleep(double now);
+  Status check(const std::vector<v1::Task>& tasks) const;
+  // `on_round` (may be empty) is called after messages were taken; true: there are more tasks.
+  Status loop(const std::function<void(const FarmProgress&)>& on_progress,
+              const std::function<Result<bool>()>& on_round);
+  Result<std::vector<v1::TaskResult>> ask(
+      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& on_progress,
+      const std::function<Result<bool>()>& on_round = {});
+
+  SocketFarmOptions options_;
+  // Ends in the reverse order: workers first, then the socket, then the folder it lives in.
+  std::unique_ptr<PrivateFolder> folder_;
+  std::unique_ptr<RouterSocket> socket_;
+  std::unique_ptr<LocalWorkers> locals_;
+  std::unique_ptr<Scheduler> scheduler_;
+  std::vector<std::string> endpoints_;
+  std::string last_trouble_;                       // why workers do not come
+  std::map<std::string, std::string> unsendable_;  // problems by hash: what is wrong
+  double next_reap_ = 0;
+  bool unanswered_ = false;  // what was asked last was stopped, or failed
 };
 
 // Handles what has arrived, lets the scheduler decide and sends what it decided.  True: something
