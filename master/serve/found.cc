@@ -95,6 +95,7 @@ void read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
   entry->status_text = running ? progress.waiting : status->stop_reason;
   entry->fitness = status->info.fitness;
   entry->unit = status->info.fitness_unit;
+  entry->higher_is_better = status->info.higher_is_better;
   entry->best = status->best;
   const auto& all = status->best_by_generation;
   const std::size_t each = std::max<std::size_t>(1, (all.size() + kMostPoints - 1) / kMostPoints);

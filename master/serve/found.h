@@ -38,6 +38,7 @@ struct WorkEntry {
   std::string state;        // "running", "finished", "stopped", "failed"
   std::string status_text;  // the headline, why it stopped or what it waits for
   std::string fitness, unit;
+  bool higher_is_better = true;
   std::optional<double> best;
   std::vector<double> best_by_generation;  // those that there are, at most 60
   std::uint64_t generation = 0, evaluations = 0;

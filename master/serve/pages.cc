@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/progress/number_text.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
@@ -20,15 +21,18 @@ namespace gapfarm {
 namespace {
 
 // The best by generation, worst tenth omitted from its scale.
-std::string spark(const std::vector<double>& values) {
+std::string spark(const WorkEntry& entry) {
+  const std::vector<double>& values = entry.best_by_generation;
   if (values.size() < 2) return "";
   std::vector<double> sorted = values;
   std::ranges::sort(sorted);
   if (!(sorted.back() > sorted.front())) return "";
-  const double tenth = sorted[sorted.size() / 10], high = sorted[sorted.size() * 9 / 10];
-  // What rose once and stayed there is all rise.
-  const double low = tenth < sorted.back() ? tenth : sorted.front();
-  const double from = low - 0.1 * (high - low), to = sorted.back();
+  const std::size_t tenth = sorted.size() / 10;
+  double low = sorted[entry.higher_is_better ? tenth : 0];
+  double to = sorted[sorted.size() - 1 - (entry.higher_is_better ? 0 : tenth)];
+  // Of what changed once and stayed there nothing is omitted.
+  if (!(to > low)) low = sorted.front(), to = sorted.back();
+  const double from = low - 0.1 * (to - low);
   std::string d;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double share = std::clamp((values[i] - from) / (to - from), 0.0, 1.0);
@@ -83,7 +87,7 @@ std::string row_of_entry(const WorkEntry& e) {
   return fmt::format(R"(<tr><th scope="row">{}<a href="/view?of={}">{}</a><small>{}</small></th>)",
                      box, percent_encoded(e.name), html_escaped(e.name), html_escaped(e.what)) +
          list_cell("state", state_text(e)) + list_cell("best", best, true) +
-         list_cell("by generation", spark(e.best_by_generation)) + list_cell("so far", extent) +
+         list_cell("by generation", spark(e)) + list_cell("so far", extent) +
          list_cell("trials", run ? std::to_string(e.trials) : "", true) +
          list_cell("seed", run ? std::to_string(e.seed) : "", true) +
          list_cell(run ? "config" : "command", "<small>" + html_escaped(e.config) + "</small>") +
@@ -110,18 +114,16 @@ void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
     if (sort == "state") return a.state > b.state;
     // Of different fitnesses there is no better one.
     if (sort == "best" && a.fitness != b.fitness) return a.fitness > b.fitness;
-    if (sort == "best") return a.best.value_or(-HUGE_VAL) > b.best.value_or(-HUGE_VAL);
+    if (sort == "best" && a.best && b.best) {
+      return a.higher_is_better ? *a.best > *b.best : *a.best < *b.best;
+    }
+    if (sort == "best") return a.best.has_value() > b.best.has_value();
     if (sort == "trials") return a.trials > b.trials;
     if (sort == "seed") return a.seed < b.seed;
     if (sort == "config") return a.config < b.config;
     return a.changed_unix_s > b.changed_unix_s;
   };
   std::stable_sort(entries->begin(), entries->end(), before);
-}
-
-std::string lowered(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
 }
 
 bool is_wanted(const WorkEntry& e, const ListView& view) {
@@ -154,8 +156,7 @@ std::string comparison_table(std::span<const RunReport> runs) {
   std::vector<const ParameterRow*> keys;
   for (const RunReport& run : runs) {
     for (const ParameterRow& row : run.parameters) {
-      const bool there = contains(keys, row.key, &ParameterRow::key);
-      if (!there) keys.push_back(&row);
+      if (!contains(keys, row.key, &ParameterRow::key)) keys.push_back(&row);
     }
   }
   std::string html =
@@ -204,12 +205,10 @@ std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
   frame.title = fmt::format("gapfarm: {} running", running);
   frame.brand = "runs and diagnoses";
   frame.places = {{"work", "All"}};
-  std::string where;
-  for (const std::string& folder : folders) where += (where.empty() ? "" : ", ") + folder;
   frame.body = fmt::format(
       R"(<section id="work"><h1 id="headline" data-file="gapfarm" data-live>{} here, {} running{}</h1><p>Beneath <code>{}</code>: runs, diagnoses, comparisons and studies, as their stores show. Tick two runs or more to see them beside each other.</p>)",
       all, running, entries.size() == all ? "" : fmt::format("; {} shown", entries.size()),
-      html_escaped(where));
+      html_escaped(joined(folders)));
   if (all == 0) {
     frame.body +=
         "<p>There is nothing yet: <code>gapfarm evolve configs/demo.toml --out run/demo</code> "

@@ -237,4 +237,22 @@ TEST(ListPage, DrawsABestThatRoseOnceAndStayed) {
   EXPECT_THAT(page, Not(HasSubstr(" nan")));
 }
 
+TEST(ListPage, KnowsWhichFitnessIsBetter) {
+  WorkEntry bad, good;
+  for (WorkEntry* entry : {&bad, &good}) {
+    entry->higher_is_better = false;
+    entry->fitness = "rmse";
+  }
+  bad.name = "bad";
+  bad.best = 2;
+  good.name = "good";
+  good.best = 1;
+  // The worst tenth is the first, and the last of the improvements shows.
+  good.best_by_generation = {100, 9, 8, 7, 6, 5, 4, 3, 2, 1};
+  const std::string page = list_page({bad, good}, {"best", "", ""}, {});
+  EXPECT_LT(page.find(">good</a>"), page.find(">bad</a>"));
+  EXPECT_THAT(page, HasSubstr("M0 2.0L11 2.0L22 4.0"));
+  EXPECT_THAT(page, HasSubstr("L100 18.4"));
+}
+
 }  // namespace gapfarm::site_test
