@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
 #include "common/base/build_info.h"
@@ -225,6 +226,12 @@ void TrialOptions::declare_reading(CLI::App& app) {
   app.add_flag("--session-prefix", read.name_sessions,
                "Put each log's file name before its sessions' names, for recorders that call them "
                "alike every day");
+}
+
+std::size_t count_sessions(const TrialLog& log) {
+  std::set<std::string> sessions;
+  for (const Trial& trial : log.trials) sessions.insert(trial.session);
+  return sessions.size();
 }
 
 void show_notes(const TrialLog& log, Console& console) {

@@ -67,6 +67,8 @@ struct TrialOptions {
 // What the readers omitted from a log and which files they read, to stderr.
 void show_notes(const TrialLog& log, Console& console);
 
+std::size_t count_sessions(const TrialLog& log);
+
 // A config with its trials read: those given, else the config's own.  Errors: neither names any
 // file, and whatever reading either finds.
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials);

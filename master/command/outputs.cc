@@ -202,6 +202,11 @@ Status Outputs::write(const std::string& path, std::string_view bytes) const {
   return write_file_atomically(path, bytes, replace ? IfThere::kReplace : IfThere::kKeep);
 }
 
+Status Outputs::write_model(const std::string& path, const Model& model) const {
+  if (Status s = check_model(model); !s) return Error{path + ": " + s.error().message};
+  return write(path, format_model(model));
+}
+
 Status Outputs::write_in(const std::string& folder, const NamedTexts& files) const {
   for (const auto& [name, text] : files) {
     if (!text.empty()) RETURN_IF_ERROR(write((fs::path(folder) / name).string(), text));

@@ -46,6 +46,8 @@ class Outputs {
   // Writes beside `path` and renames.  A file that has appeared since it was planned is kept, and
   // the new one lies beside it under another name, which the error shows.
   Status write(const std::string& path, std::string_view bytes) const;
+  // Error also: a model that would not be read again.
+  Status write_model(const std::string& path, const Model& model) const;
   // Texts under their names in a folder; those that are empty are omitted.
   using NamedTexts = std::vector<std::pair<std::string, std::string>>;
   Status write_in(const std::string& folder, const NamedTexts& files) const;

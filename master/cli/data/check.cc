@@ -156,13 +156,9 @@ std::vector<SanityFinding> warnings(const Config& config) {
 Summary summarise(const Config& config) {
   const Problem& problem = config.problem;
   Summary summary;
-  std::set<std::string> sessions;
-  for (const Trial& trial : problem.log.trials) {
-    sessions.insert(trial.session);
-    ++summary.commands[trial.command];
-  }
+  for (const Trial& trial : problem.log.trials) ++summary.commands[trial.command];
   summary.trials = problem.log.trials.size();
-  summary.sessions = sessions.size();
+  summary.sessions = count_sessions(problem.log);
   unsigned context = kNoContext;
   for (const std::size_t e : enabled_effects(problem)) {
     const Effect& effect = problem.table().effects()[e];

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -217,13 +216,12 @@ Result<int> run_import(ImportOptions& options, CliContext& context) {
   for (const TrialFile& file : files) {
     RETURN_IF_ERROR(options.outputs.write(file.path, file.text));
   }
-  std::set<std::string> sessions;
-  for (const Trial& trial : log.trials) sessions.insert(trial.session);
-  console.result(std::to_string(log.trials.size()) + " trials in " +
-                     std::to_string(sessions.size()) + " sessions written to " + options.out + "\n",
+  const std::size_t sessions = count_sessions(log);
+  console.result(std::to_string(log.trials.size()) + " trials in " + std::to_string(sessions) +
+                     " sessions written to " + options.out + "\n",
                  {{"out", options.out},
                   {"trials", log.trials.size()},
-                  {"sessions", sessions.size()},
+                  {"sessions", sessions},
                   {"read", log.files},
                   {"notes", log.notes}});
   return kExitDone;

@@ -7,9 +7,9 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 
-#include "common/base/shell.h"
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
@@ -32,7 +32,6 @@ struct InitOptions {
 struct LogFigures {
   std::vector<CommandSpec> commands;  // of the log, each as it was mostly given
   std::map<std::string, std::size_t> counts;
-  std::size_t sessions = 0;
   std::optional<double> speed_m_s;  // at full duty, of straight drives
 };
 
@@ -40,27 +39,20 @@ bool drives_straight(const CommandSpec& c) { return c.left == c.right && c.left 
 
 LogFigures figures_of(const TrialLog& log, const std::vector<CommandSpec>& known) {
   LogFigures figures;
-  std::set<std::string> sessions;
   std::map<std::string, std::vector<CommandSpec>> given;
   std::vector<double> speeds;
   for (const Trial& trial : log.trials) {
     const CommandSpec c = resolved_command(trial, known);
-    sessions.insert(trial.session);
     ++figures.counts[trial.command];
     given[trial.command].push_back(c);
     if (!drives_straight(c) || c.duration_s <= 0) continue;
     const Pose X_SE = between(trial.X_WS, trial.X_WE);
     speeds.push_back(std::hypot(X_SE.x, X_SE.y) / (std::abs(c.left) * c.duration_s));
   }
-  figures.sessions = sessions.size();
   if (!speeds.empty()) figures.speed_m_s = median(speeds);
   for (const auto& [name, all] : given) {
     CommandSpec typical{name, 0, 0, 0};
-    const auto middle = [&](double CommandSpec::*of) {
-      std::vector<double> values;
-      for (const CommandSpec& c : all) values.push_back(c.*of);
-      return median(values);
-    };
+    const auto middle = [&](double CommandSpec::*of) { return median(mapped(all, of)); };
     typical.left = middle(&CommandSpec::left);
     typical.right = middle(&CommandSpec::right);
     typical.duration_s = middle(&CommandSpec::duration_s);
@@ -129,16 +121,16 @@ std::string command_text(const LogFigures& figures, const std::vector<CommandSpe
 
 std::string config_of_log(const LogFigures& figures, const TrialLog& log,
                           const std::vector<CommandSpec>& known, const InitOptions& options) {
-  std::string files, counts;
-  for (const std::string& file : options.trials.files) {
-    files += (files.empty() ? "\"" : ", \"") + file_seen_from(options.out, file) + "\"";
-  }
+  const std::string files = joined(options.trials.files, ", ", [&](const std::string& file) {
+    return '"' + file_seen_from(options.out, file) + '"';
+  });
+  std::string counts;
   for (const auto& [name, count] : figures.counts) counts += fmt::format(" {} {},", count, name);
   counts.pop_back();
   return fmt::format(
              "# Made by `gapfarm init` of {} trials in {} sessions:{}.\n"
              "# Lines with QUESTION are guesses; answer them, then `gapfarm check` this file.\n",
-             log.trials.size(), figures.sessions, counts) +
+             log.trials.size(), count_sessions(log), counts) +
          "scenario = \"srv1\"     # a robot on two sides that stands still before and after a "
          "command\n"
          "seed = 1\ntrials = [" +
@@ -172,16 +164,9 @@ Result<int> run_init(InitOptions& options, CliContext& context) {
   const std::string text = config_of_log(figures, log, known, options);
   Json json = {{"out", options.out}, {"trials", log.trials.size()}};
   if (figures.speed_m_s) json["full_speed"] = *figures.speed_m_s;
-  if (options.out == "-") {
-    json["config"] = text;
-    console.result(text, json);
-    return kExitDone;
-  }
-  RETURN_IF_ERROR(options.outputs.write(options.out, text));
-  console.result(options.out + ": a config for " + std::to_string(log.trials.size()) +
-                     " trials; answer its QUESTIONs, then: gapfarm check " +
-                     shell_quoted(options.out) + "\n",
-                 json);
+  if (options.out != "-") RETURN_IF_ERROR(options.outputs.write(options.out, text));
+  show_config(options.out, std::to_string(log.trials.size()) + " trials", text, std::move(json),
+              console);
   return kExitDone;
 }
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/base/ranges.h"
 #include "common/base/shell.h"
 #include "common/base/try.h"
 #include "common/robot/robot_file.h"
@@ -17,12 +18,10 @@
 namespace gapfarm {
 namespace {
 
-bool ends_with(const std::string& file, std::initializer_list<const char*> endings) {
-  const std::string extension = std::filesystem::path(file).extension().string();
-  for (const char* ending : endings) {
-    if (extension == ending) return true;
-  }
-  return false;
+namespace fs = std::filesystem;
+
+bool ends_with(const std::string& file, std::initializer_list<std::string_view> endings) {
+  return contains(endings, fs::path(file).extension().string());
 }
 
 // A robot.toml says everything itself.
@@ -50,16 +49,6 @@ Result<std::vector<DriveFacts>> read_controllers(const std::vector<std::string>&
     facts.insert(facts.end(), read.drives.begin(), read.drives.end());
   }
   return facts;
-}
-
-namespace fs = std::filesystem;
-
-bool is_robot_file(const std::string& word) {
-  static constexpr const char* kExtensions[] = {".urdf", ".xacro", ".xml",
-                                                ".yaml", ".yml",   ".toml"};
-  const std::string extension = fs::path(word).extension().string();
-  return std::any_of(std::begin(kExtensions), std::end(kExtensions),
-                     [&](const char* e) { return extension == e; });
 }
 
 // Where the robot goes: husky.toml has its robot in husky_robot.toml.
@@ -153,27 +142,33 @@ std::string file_seen_from(const std::string& out, const std::string& file) {
 }
 
 bool names_a_robot(const std::vector<std::string>& arguments) {
-  return std::ranges::any_of(arguments, is_robot_file);
+  return std::ranges::any_of(arguments, [](const std::string& word) {
+    return ends_with(word, {".urdf", ".xacro", ".xml", ".yaml", ".yml", ".toml"});
+  });
 }
 
 Result<int> run_init_robot(const std::vector<std::string>& arguments, const std::string& out,
                            Outputs& outputs, CliContext& context) {
-  Console& console = context.console;
   const RobotSetup setup = setup_of_arguments(arguments, out);
   ASSIGN_OR_RETURN(const RobotTexts texts, set_up_robot(setup, outputs));
   if (out != "-") RETURN_IF_ERROR(outputs.plan(std::vector<std::string>{setup.robot, out}));
   Json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};
-  if (out == "-") {
-    json["config"] = texts.config;
-    console.result(texts.config, json);
-    return kExitDone;
+  if (out != "-") {
+    context.begun = true;
+    RETURN_IF_ERROR(write_robot(setup, texts, outputs));
   }
-  context.begun = true;
-  RETURN_IF_ERROR(write_robot(setup, texts, outputs));
-  console.result(out + ": a config for the robot in " + setup.robot +
-                     "; answer its QUESTIONs, then: gapfarm check " + shell_quoted(out) + "\n",
-                 json);
+  show_config(out, "the robot in " + setup.robot, texts.config, std::move(json), context.console);
   return kExitDone;
+}
+
+void show_config(const std::string& out, const std::string& of, const std::string& text, Json json,
+                 Console& console) {
+  if (out == "-") json["config"] = text;
+  console.result(out == "-" ? text
+                            : out + ": a config for " + of +
+                                  "; answer its QUESTIONs, then: gapfarm check " +
+                                  shell_quoted(out) + "\n",
+                 json);
 }
 
 }  // namespace gapfarm

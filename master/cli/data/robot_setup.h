@@ -41,6 +41,10 @@ bool names_a_robot(const std::vector<std::string>& arguments);
 Result<int> run_init_robot(const std::vector<std::string>& arguments, const std::string& out,
                            Outputs& outputs, CliContext& context);
 
+// Says where a config went and what it is of; for `out` "-" shows its text.
+void show_config(const std::string& out, const std::string& of, const std::string& text, Json json,
+                 Console& console);
+
 // A robot out of the files that its user has: URDFs, robot.tomls, and controller files among them
 // (.yaml, .yml) or in `controllers`: the first robot; what others say differently is added to its
 // disagreements.  Errors name the file.

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "common/base/build_info.h"
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/cli/diagnosis/diagnose_command.h"
@@ -28,13 +28,11 @@ void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& comma
                               Diagnosis* diagnosis) {
   auto& to = diagnosis->provenance;
   const TrialLog& log = config.problem.log;
-  std::set<std::string> sessions;
-  for (const Trial& trial : log.trials) sessions.insert(trial.session);
   to.emplace_back("config", config.path);
   for (const std::string& file : config.trial_files) to.emplace_back("trials", file);
   to.emplace_back("problem", problem_hash(to_proto(config.problem)));
   to.emplace_back("trials read",
-                  fmt::format("{} in {} sessions", log.trials.size(), sessions.size()));
+                  fmt::format("{} in {} sessions", log.trials.size(), count_sessions(log)));
   to.emplace_back("base model", command.model.empty() ? "tuned on this log" : command.model);
   for (const std::string& effect : command.exclude) {
     to.emplace_back("omitted from the catalogue", effect);
@@ -111,11 +109,6 @@ Model model_of(const Config& config, const DiagnosisResult& result, const Parame
   return model;
 }
 
-Status write_model(const Model& model, const std::filesystem::path& path, const Outputs& outputs) {
-  if (Status s = check_model(model); !s) return Error{path.string() + ": " + s.error().message};
-  return outputs.write(path.string(), format_model(model));
-}
-
 Status write_models(const Config& config, const DiagnoseCommand& command,
                     const DiagnosisResult& result) {
   const std::filesystem::path out(command.out);
@@ -126,9 +119,9 @@ Status write_models(const Config& config, const DiagnoseCommand& command,
     const auto& [lo, hi] = result.intervals[i];
     if (lo < hi) model.intervals[i] = Interval{lo, hi};
   }
-  RETURN_IF_ERROR(write_model(model, out / "model.toml", command.outputs));
+  RETURN_IF_ERROR(command.outputs.write_model((out / "model.toml").string(), model));
   const Model tuned = model_of(config, result, result.tuned, "tuned");
-  return write_model(tuned, out / "tuned.toml", command.outputs);
+  return command.outputs.write_model((out / "tuned.toml").string(), tuned);
 }
 
 bool has_models(const DiagnosisResult& result) {
@@ -146,9 +139,8 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
     for (const char* name : {"model.toml", "tuned.toml"})
       std::filesystem::remove(out / name, ignored);
   }
-  const Status report =
-      command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
-  if (!report) return report;
+  RETURN_IF_ERROR(
+      command.outputs.write((out / "report.html").string(), report_html(result.diagnosis)));
   // Last: whoever sees it sees the rest.
   return command.outputs.write((out / kDiagnosisFile).string(), to_json(result.diagnosis));
 }
@@ -196,9 +188,9 @@ Status plan_outputs(DiagnoseCommand& command, const Config& config, const Proven
 }
 
 std::vector<ProgressStage> diagnosis_stages() {
-  std::vector<ProgressStage> all;
-  for (const DiagnosisStage& stage : kDiagnosisStages) all.push_back({stage.name, stage.share});
-  return all;
+  return mapped(kDiagnosisStages, [](const DiagnosisStage& stage) -> ProgressStage {
+    return {stage.name, stage.share};
+  });
 }
 
 // What the command line says of the problem, on top of the config.
@@ -255,10 +247,8 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
   add_diagnosis_provenance(config, command, &result.diagnosis);
   for (const auto& [fit, tasks] : result.fits) {
     // A stop may have come between them: their numbers need not follow one another.
-    std::string questions;
-    for (const v1::Task& task : tasks) {
-      questions += (questions.empty() ? "" : ", ") + work.answers().key(result.problem, task);
-    }
+    const std::string questions = joined(
+        tasks, ", ", [&](const auto& task) { return work.answers().key(result.problem, task); });
     result.diagnosis.provenance.emplace_back("predictions of " + fit,
                                              fmt::format("{}, questions {}", kAnswers, questions));
   }

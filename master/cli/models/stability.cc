@@ -46,14 +46,11 @@ std::string tried_csv(const StabilityReport& report, const Problem& problem) {
 Status write_all(const StabilityCommand& command, const Config& config,
                  const StabilityReport& report) {
   const std::filesystem::path out(command.out);
-  const Status tried =
-      command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem));
-  if (!tried) return tried;
+  RETURN_IF_ERROR(
+      command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem)));
   Model model = model_of_problem(config.problem, report.best.values);
   model.kind = "stable";
-  const std::string path = (out / "model.toml").string();
-  if (Status s = check_model(model); !s) return Error{path + ": " + s.error().message};
-  return command.outputs.write(path, format_model(model));
+  return command.outputs.write_model((out / "model.toml").string(), model);
 }
 
 Result<int> run_stability(StabilityCommand command, CliContext& context) {
