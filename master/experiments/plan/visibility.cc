@@ -53,15 +53,6 @@ NoiseEstimate noise_of(const DiagnosisSubject& subject, const ParameterValues& v
   return noise;
 }
 
-Arena arena_of(const TrialLog& log) {
-  std::vector<double> x, y;
-  for (const Trial& trial : log.trials) {
-    x.push_back(trial.X_WS.x);
-    y.push_back(trial.X_WS.y);
-  }
-  return {quantile(x, 0), quantile(x, 1), quantile(y, 0), quantile(y, 1)};
-}
-
 Overrides with_effect(const Study& study, const EffectDraw& draw, double strength) {
   Overrides at = study.base;
   const std::vector<double> values = effect_values(*study.table, draw, strength);
@@ -181,7 +172,7 @@ Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
   ASSIGN_OR_RETURN(auto nuisances, subject.nuisances(predictor, study));
   Signals found;
   found.nuisances = std::move(nuisances);
-  const Arena arena = arena_of(log);
+  const Arena arena = arena_of(log, 0);
   for (const std::size_t effect : settings.effects) {
     if (!planned.table().effects()[effect].moves_means()) continue;
     for (unsigned d = 0; d < settings.draws; ++d) {

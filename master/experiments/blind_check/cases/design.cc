@@ -8,7 +8,6 @@
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/trials/text/csv.h"
-#include "master/experiments/blind_check/cases/design.h"
 #include "master/farm/planned_trials.h"
 
 namespace gapfarm {
@@ -76,20 +75,11 @@ std::vector<std::size_t> chosen_effects(const ParameterTable& table,
   return chosen;
 }
 
-Arena arena_of(const TrialLog& log) {
-  std::vector<double> x, y;
-  for (const Trial& trial : log.trials) {
-    x.push_back(trial.X_WS.x);
-    y.push_back(trial.X_WS.y);
-  }
-  return {quantile(x, 0.02), quantile(x, 0.98), quantile(y, 0.02), quantile(y, 0.98)};
-}
-
 // Collects cases before their names are dealt.
 class Drafts {
  public:
   Drafts(const Problem& problem, const DesignSettings& settings)
-      : problem_(problem), settings_(settings), arena_(arena_of(problem.log)) {}
+      : problem_(problem), settings_(settings), arena_(arena_of(problem.log, 0.02)) {}
 
   void add(CaseKind kind, const SizeLevel& level, const std::vector<std::size_t>& effects) {
     const std::size_t index = cases.size();

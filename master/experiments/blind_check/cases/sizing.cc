@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
+#include "common/math/statistics.h"
 #include "common/problem/problem.h"
 #include "common/score/fitness.h"
 #include "master/report/prediction_table.h"
@@ -40,6 +42,12 @@ double draw_rest(const Parameter& p, const std::string& key, const Arena& arena,
 }
 
 }  // namespace
+
+Arena arena_of(const TrialLog& log, double share) {
+  const auto x = mapped(log.trials, [](const Trial& trial) { return trial.X_WS.x; });
+  const auto y = mapped(log.trials, [](const Trial& trial) { return trial.X_WS.y; });
+  return {quantile(x, share), quantile(x, 1 - share), quantile(y, share), quantile(y, 1 - share)};
+}
 
 EffectDraw draw_effect(const ParameterTable& table, std::size_t effect, const Arena& arena,
                        Stream& stream) {

@@ -6,6 +6,7 @@
 
 #include "common/parameters/table.h"
 #include "common/random/stream.h"
+#include "common/trials/trial.h"
 #include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
@@ -15,6 +16,9 @@ struct Arena {
   double x_lower = 0, x_upper = 2;
   double y_lower = 0, y_upper = 2;
 };
+
+// But for this share of the trials on each side.
+Arena arena_of(const TrialLog& log, double share);
 
 // One way in which an effect may be there: everything about it but how strong it is.
 struct EffectDraw {
