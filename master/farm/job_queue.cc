@@ -13,11 +13,10 @@
 namespace gapfarm {
 namespace {
 
-// False for what an honest worker never sends: no outcome, an OK of another kind than the task's,
-// or a fitness that is no finite number.
+// False for what an honest worker never sends: an OK of another kind than the task's, or a fitness
+// that is no finite number.  REQUIRES: is_answer().
 bool answers(const v1::Task& task, const v1::TaskResult& result) {
   const v1::Outcome outcome = result.outcome();
-  if (outcome == v1::OUTCOME_UNSPECIFIED || !v1::Outcome_IsValid(outcome)) return false;
   if (outcome == v1::WORKER_FAILED) return false;  // the master's own word
   if (outcome != v1::OK && outcome != v1::INFEASIBLE) return true;
   switch (task.kind_case()) {

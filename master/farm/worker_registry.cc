@@ -1,11 +1,18 @@
 #include "master/farm/worker_registry.h"
 
-namespace gapfarm {
+#include "common/base/ranges.h"
 
+namespace gapfarm {
 namespace {
 
 constexpr std::size_t kGoneKept = 200;
 constexpr std::size_t kNameLimit = 200;  // bytes; names go to logs and status
+
+constexpr std::size_t kMostFleets = 100;
+constexpr std::size_t kMostNameBytes = 100;
+constexpr std::size_t kMostWhyBytes = 500;
+// A fleet reports every few seconds, also while its cluster keeps it waiting.
+constexpr double kHeardFor_s = 120;
 
 WorkerStatus status_of(const WorkerRecord& worker, const char* state, double now) {
   WorkerStatus status;
@@ -129,16 +136,6 @@ std::vector<WorkerStatus> WorkerRegistry::status(double now) const {
   return all;
 }
 
-namespace {
-
-constexpr std::size_t kMostFleets = 100;
-constexpr std::size_t kMostNameBytes = 100;
-constexpr std::size_t kMostWhyBytes = 500;
-// A fleet reports every few seconds, also while its cluster keeps it waiting.
-constexpr double kHeardFor_s = 120;
-
-}  // namespace
-
 bool FleetRegistry::hear(const std::string& peer, const v1::Fleet& report, double now) {
   if (report.name().empty() || report.name().size() > kMostNameBytes ||
       report.system().size() > kMostNameBytes || report.host().size() > kMostNameBytes) {
@@ -168,9 +165,7 @@ std::vector<FleetStatus> FleetRegistry::status(double now) const {
 }
 
 std::vector<std::string> FleetRegistry::peers() const {
-  std::vector<std::string> all;
-  for (const auto& [name, heard] : fleets_) all.push_back(heard.peer);
-  return all;
+  return mapped(fleets_, [](const auto& fleet) { return fleet.second.peer; });
 }
 
 }  // namespace gapfarm

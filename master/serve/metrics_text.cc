@@ -9,17 +9,37 @@
 namespace gapfarm {
 namespace {
 
+std::string number_of_metric(double value) {
+  if (std::isnan(value)) return "NaN";
+  if (std::isinf(value)) return value > 0 ? "+Inf" : "-Inf";
+  return formatted("%.17g", value);
+}
+
 class MetricsPage {
  public:
   enum Type { kGauge, kCounter };
   // One value of metric `name` (without the program's prefix) with the labels `labels`, as
   // label() makes them, joined by commas.  Values of a metric follow one another.
   void add(const std::string& name, Type type, const std::string& help, const std::string& labels,
-           double value);
+           double value) {
+    if (name != last_) {
+      last_ = name;
+      text_ += "# HELP gapfarm_" + name + " " + help + "\n# TYPE gapfarm_" + name +
+               (type == kGauge ? " gauge\n" : " counter\n");
+    }
+    text_ += "gapfarm_" + name + "{" + labels + "} " + number_of_metric(value) + "\n";
+  }
   const std::string& text() const { return text_; }
 
   // KEY="VALUE", escaped.
-  static std::string label(const std::string& key, const std::string& value);
+  static std::string label(const std::string& key, const std::string& value) {
+    std::string out = key + "=\"";
+    for (const char c : value) {
+      if (c == '\\' || c == '"') out += '\\';
+      out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+    }
+    return out + "\"";
+  }
 
  private:
   std::string text_;
@@ -55,12 +75,6 @@ constexpr MetricRow kMetricRows[] = {
      [](const WorkEntry& e, double) { return static_cast<double>(e.given_up); }},
 };
 
-std::string number_of_metric(double value) {
-  if (std::isnan(value)) return "NaN";
-  if (std::isinf(value)) return value > 0 ? "+Inf" : "-Inf";
-  return formatted("%.17g", value);
-}
-
 void add_optional(const std::vector<WorkEntry>& entries, const char* name, const char* help,
                   std::optional<double> WorkEntry::*value, MetricsPage* page) {
   for (const WorkEntry& e : entries) {
@@ -90,25 +104,6 @@ void add_farms(const std::vector<WorkEntry>& entries, MetricsPage* page) {
 }
 
 }  // namespace
-
-void MetricsPage::add(const std::string& name, Type type, const std::string& help,
-                      const std::string& labels, double value) {
-  if (name != last_) {
-    last_ = name;
-    text_ += "# HELP gapfarm_" + name + " " + help + "\n# TYPE gapfarm_" + name +
-             (type == kGauge ? " gauge\n" : " counter\n");
-  }
-  text_ += "gapfarm_" + name + "{" + labels + "} " + number_of_metric(value) + "\n";
-}
-
-std::string MetricsPage::label(const std::string& key, const std::string& value) {
-  std::string out = key + "=\"";
-  for (const char c : value) {
-    if (c == '\\' || c == '"') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
-  }
-  return out + "\"";
-}
 
 std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_s) {
   MetricsPage page;

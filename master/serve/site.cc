@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/diagnose/result/diagnosis_json.h"
@@ -81,8 +82,7 @@ void Site::look() {
 }
 
 const FoundWork* Site::find(const std::string& name) const {
-  const auto found = std::ranges::find(found_, name, &FoundWork::name);
-  return found == found_.end() ? nullptr : &*found;
+  return find_by(found_, name, &FoundWork::name);
 }
 
 const WorkEntry& Site::entry(const FoundWork& found) const {
@@ -215,9 +215,8 @@ HttpResponse Site::events(const Target& target) {
 Result<std::string> Site::made(const Target& target) const {
   if (target.path == "/view") return view(target);
   if (target.path == "/compare") return compare(target);
-  std::vector<std::string> folders;
-  for (const auto& folder : sources_.folders) folders.push_back(folder.string());
-  return list_page(entries_, list_view(target), folders);
+  const auto name = [](const std::filesystem::path& folder) { return folder.string(); };
+  return list_page(entries_, list_view(target), mapped(sources_.folders, name));
 }
 
 Result<std::string> Site::view(const Target& target) const {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/cli/subcommand.h"
@@ -255,9 +256,7 @@ Result<std::vector<Effect>> catalogue_of(const EffectsOptions& options) {
   if (options.config.empty()) return std::vector<Effect>(tracked.begin(), tracked.end());
   ASSIGN_OR_RETURN(const Config config, read_config(options.config));
   const ParameterTable& table = config.problem.table();
-  std::vector<Effect> effects;
-  for (const std::size_t e : pictured(table)) effects.push_back(table.effects()[e]);
-  return effects;
+  return mapped(pictured(table), [&](std::size_t e) { return table.effects()[e]; });
 }
 
 Result<int> run_effects(EffectsOptions& options, CliContext& context) {

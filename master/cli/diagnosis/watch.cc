@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/hash.h"
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"
@@ -249,9 +250,8 @@ Result<int> run_watch(WatchCommand& command, CliContext& context) {
     return Error{command.folder + ": no run could be fitted"};
   }
   fleet.rows = watched_rows(robots.front().robot);
-  std::vector<std::vector<OffsetFit>> fits;
-  for (const WatchedRobot& robot : fleet.robots) fits.push_back(robot.fits);
-  const FleetChanges changes = find_changes(fleet.rows, fits, command.seed);
+  const FleetChanges changes =
+      find_changes(fleet.rows, mapped(fleet.robots, &WatchedRobot::fits), command.seed);
   const Json json = watch_json(fleet, changes);
   RETURN_IF_ERROR(command.outputs.write_in(
       command.out,

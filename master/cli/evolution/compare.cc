@@ -24,8 +24,6 @@
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 struct CompareCommand {
   std::vector<std::string> files;
   TrialOptions trials;
@@ -159,30 +157,19 @@ Status write_all(const CompareCommand& command, const Inputs& inputs,
        {kFiles[3], comparison_page(summary, "Searches compared", provenance(command, inputs))}});
 }
 
-nlohmann::ordered_json to_json(const ComparisonSummary& summary) {
-  Json baselines = Json::array(), variants = Json::array();
-  for (const Baseline& b : summary.baselines) {
-    baselines.push_back({{"name", b.name}, {"fitness", number_or_null(b.fitness)}});
-  }
-  for (const VariantSummary& v : summary.variants) {
-    variants.push_back({{"name", v.name},
-                        {"median", v.median},
-                        {"median_lo", v.median_95.lower},
-                        {"median_hi", v.median_95.upper},
-                        {"mean_rank", v.mean_rank},
-                        {"successes", v.successes},
-                        {"median_to_target", number_or_null(v.median_to_target)},
-                        {"expected_to_target", number_or_null(v.expected_to_target)},
-                        {"final", v.final_fitness}});
-  }
-  return {{"fitness", summary.fitness},
-          {"higher_is_better", summary.higher_is_better},
-          {"target", number_or_null(summary.target)},
-          {"evaluations", summary.evaluations},
-          {"seeds", summary.seeds},
-          {"baselines", baselines},
-          {"variants", variants}};
-}
+constexpr auto kBaseline = [](auto& v, const Baseline& row) { FIELDS(name, fitness); };
+constexpr auto kVariant = [](auto& v, const VariantSummary& row) {
+  FIELDS(name, median);
+  v.field("median_lo", row.median_95.lower);
+  v.field("median_hi", row.median_95.upper);
+  FIELDS(mean_rank, successes, median_to_target, expected_to_target);
+  v.field("final", row.final_fitness);
+};
+constexpr auto kSummary = [](auto& v, const ComparisonSummary& row) {
+  FIELDS(fitness, higher_is_better, target, evaluations, seeds);
+  v.list("baselines", row.baselines, kBaseline);
+  v.list("variants", row.variants, kVariant);
+};
 
 Status plan_outputs(CompareCommand& command, const Inputs& inputs) {
   for (const std::string& file : command.files) command.outputs.reads(file);
@@ -227,7 +214,7 @@ Result<int> run_compare(CompareCommand& command, CliContext& context) {
         {"constant velocity", constant ? std::optional(*constant) : std::nullopt});
   }
   RETURN_IF_ERROR(write_all(command, inputs, summary, runs));
-  context.console.result(comparison_text(summary), to_json(summary));
+  context.console.result(comparison_text(summary), FieldWriter::written(summary, kSummary));
   context.console.note("wrote: " + (std::filesystem::path(command.out) / "compare.html").string() +
                        ", summary.csv, runs.csv, convergence.csv");
   return asked->given_up() > 0 ? kExitQuarantined : kExitDone;

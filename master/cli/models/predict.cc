@@ -9,6 +9,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
@@ -173,9 +174,8 @@ Result<int> run_predict(PredictOptions& options, CliContext& context) {
   }
   std::string beside;
   if (options.mined.empty()) {
-    std::vector<double> scores;
-    for (const PredictedTrial& p : predictions) scores.push_back(p.log_score);
-    ASSIGN_OR_RETURN(beside, baseline_note(model, log, scores));
+    ASSIGN_OR_RETURN(beside,
+                     baseline_note(model, log, mapped(predictions, &PredictedTrial::log_score)));
   }
   show_summary(log, predictions, beside, options, console);
   return kExitDone;

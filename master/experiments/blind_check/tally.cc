@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/config/model.h"
 #include "master/farm/planned_trials.h"
@@ -76,8 +77,7 @@ std::optional<DiagnosedCase> read_diagnosed_case(const Truth& truth, const std::
 Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     const Config& config, const std::vector<DiagnosedCase>& cases, const SessionPlans& plan,
     Farm& farm, const DesignProgress& progress) {
-  std::vector<Truth> truths;
-  for (const DiagnosedCase& c : cases) truths.push_back(c.truth);
+  const std::vector<Truth> truths = mapped(cases, &DiagnosedCase::truth);
   ASSIGN_OR_RETURN(std::vector<TrialLog> logs,
                    simulate_cases(config, truths, plan, /*seed_offset=*/1, farm, progress));
   std::vector<std::optional<FreshScores>> scores;

@@ -257,9 +257,9 @@ std::string comparison_page(const ComparisonSummary& summary, const std::string&
   }
   add_ranks(summary, page);
   page.heading("Inputs");
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& [key, value] : provenance) rows.push_back({key, value});
-  page.table({"", ""}, rows);
+  page.table({"", ""}, mapped(provenance, [](const auto& row) -> std::vector<std::string> {
+               return {row.first, row.second};
+             }));
   return page.finish();
 }
 
@@ -313,9 +313,9 @@ std::string summary_csv(const ComparisonSummary& summary) {
     for (const double p : summary.pair_p[i]) text += "," + number(p);
     text += "\n";
   }
-  const std::string blanks(9 + summary.variants.size(), ',');
+  const std::string blanks(8 + summary.variants.size(), ',');
   for (const Baseline& baseline : summary.baselines) {
-    text += csv_field(baseline.name) + ",," + number(baseline.fitness) + blanks.substr(1) + "\n";
+    text += csv_field(baseline.name) + ",," + number(baseline.fitness) + blanks + "\n";
   }
   return text;
 }

@@ -24,11 +24,6 @@ void read_pattern(TomlSection& section, const char* key, std::string* to) {
   }
 }
 
-// Whether one of `states` is `state`.
-bool among(const std::vector<std::string>& states, const std::string& state) {
-  return contains(states, state);
-}
-
 }  // namespace
 
 Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
@@ -139,9 +134,9 @@ std::vector<ListedJob> parse_list(const ClusterSite& site, const std::string& na
       if (column == "name") named = value;
     }
     if (!task.empty()) job.id += "." + task;
-    if (named != name || job.id.empty() || among(site.ended, job.state)) continue;
-    if (among(site.queued, job.state)) job.standing = ListedJob::kQueued;
-    if (among(site.stuck, job.state)) job.standing = ListedJob::kStuck;
+    if (named != name || job.id.empty() || contains(site.ended, job.state)) continue;
+    if (contains(site.queued, job.state)) job.standing = ListedJob::kQueued;
+    if (contains(site.stuck, job.state)) job.standing = ListedJob::kStuck;
     jobs.push_back(std::move(job));
   }
   return jobs;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "common/base/constants.h"
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
@@ -224,8 +225,8 @@ bool check_heading_unit(const std::vector<DriveSample>& samples,
   constexpr double kGood = 0.75, kBad = 0.6;
   std::vector<DriveSample> straight = straight_samples(samples);
   if (straight.size() < kFewestStraight) return false;
-  std::vector<double> sizes;
-  for (const DriveSample& s : straight) sizes.push_back(std::abs(s.X_WS.theta));
+  const std::vector<double> sizes =
+      mapped(straight, [](const DriveSample& s) { return std::abs(s.X_WS.theta); });
   if (quantile(sizes, 0.95) > kSmall_rad) return false;
   const double as_logged = concentration(straight, 1);
   const double scaled = concentration(straight, 1 / kDegree);
@@ -329,9 +330,7 @@ TravelFit fit_travel(const std::vector<DriveSample>& samples) {
   const std::vector<DriveSample> straight = straight_samples(samples);
   TravelFit fit;
   if (straight.size() < kFewestStraight) return fit;
-  std::vector<double> distances;
-  for (const DriveSample& s : straight) distances.push_back(s.distance_m());
-  const double typical = median(distances);
+  const double typical = median(mapped(straight, &DriveSample::distance_m));
   std::complex<double> same = 0, mirrored = 0;
   for (const DriveSample& s : straight) {
     if (!(s.distance_m() > kLeastShare * typical)) continue;
