@@ -225,16 +225,8 @@ void take_commands(const std::vector<DriveFacts>& facts, GroundRobot& robot) {
 void take_controller(const std::vector<DriveFacts>& facts, RobotReading& reading) {
   GroundRobot& robot = reading.robot;
   ControllerKinematics& c = robot.controller;
-  take(facts, "wheel_separation", c.wheel_separation_m);
-  take(facts, "wheel_radius", c.wheel_radius_m);
-  take(facts, "wheel_separation_multiplier", c.wheel_separation_multiplier);
-  take(facts, "left_wheel_radius_multiplier", c.left_wheel_radius_multiplier);
-  take(facts, "right_wheel_radius_multiplier", c.right_wheel_radius_multiplier);
-  take(facts, "wheelbase", c.wheelbase_m);
-  take(facts, "traction_track_width", c.traction_track_width_m);
-  take(facts, "steering_track_width", c.steering_track_width_m);
-  take(facts, "lx_plus_ly", c.sum_of_robot_center_projection_m);
-  take(facts, "robot_radius", c.robot_radius_m);
+  for (const auto& [name, size] : kControllerSizes) take(facts, name, c.*size);
+  for (const auto& [name, factor] : kControllerFactors) take(facts, name, c.*factor);
   take(facts, "wheel_offset", c.wheel_offset_rad);
   take(facts, "max_steering", robot.steering.limit_rad);
   // A limit of 0 means none in Gazebo's plugins.

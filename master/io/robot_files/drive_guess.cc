@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -73,8 +75,7 @@ class Guess {
       if (std::abs(first->axis_B.dot(wheel.axis_B)) < kParallel) guess_.parallel = false;
     }
     if (first == nullptr) {
-      std::size_t turned = 0;
-      for (const ChassisWheel& wheel : chassis_.wheels) turned += wheel.steered ? 1 : 0;
+      const auto turned = std::ranges::count(chassis_.wheels, true, &ChassisWheel::steered);
       if (turned == 0) {
         return refuse("nothing but casters (joint '" + chassis_.wheels[0].joint->name + "', ...)",
                       "name the driven wheels in a controller file (--controllers)");
@@ -165,11 +166,9 @@ class Guess {
   }
 
   Status set_steered(const std::vector<const ChassisWheel*>& steered) {
-    std::string names;
-    for (const ChassisWheel* wheel : steered) {
-      const std::string& name = wheel->turning->name;
-      if (names.find(name) == names.npos) names += (names.empty() ? "'" : ", '") + name + "'";
-    }
+    std::set<std::string> joints;
+    for (const ChassisWheel* wheel : steered) joints.insert("'" + wheel->turning->name + "'");
+    const std::string names = joined(joints);
     because(std::to_string(steered.size()) + " wheels on steering joints (" + names + ")");
     if (steered.size() == 1) {
       guess_.drive = DriveKind::kTricycle;

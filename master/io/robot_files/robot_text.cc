@@ -11,6 +11,7 @@
 #include "common/base/text.h"
 #include "common/json/json.h"
 #include "common/parameters/ground.h"
+#include "master/io/robot_files/compare_facts.h"
 
 namespace gapfarm {
 namespace {
@@ -155,26 +156,14 @@ std::string list(const std::string& heading, const std::vector<std::string>& sen
 }
 
 std::string controller_text(const ControllerKinematics& c) {
-  const std::pair<const char*, std::optional<double>> sizes[] = {
-      {"wheel_separation", c.wheel_separation_m},
-      {"wheel_radius", c.wheel_radius_m},
-      {"wheelbase", c.wheelbase_m},
-      {"traction_track_width", c.traction_track_width_m},
-      {"steering_track_width", c.steering_track_width_m},
-      {"lx + ly", c.sum_of_robot_center_projection_m},
-      {"robot_radius", c.robot_radius_m}};
-  std::string text;
-  for (const auto& [name, value] : sizes) {
-    if (value) text += (text.empty() ? "" : ", ") + std::string(name) + " " + number(value) + " m";
+  std::vector<std::string> parts;
+  for (const auto& [name, size] : kControllerSizes) {
+    if (c.*size) parts.push_back(std::string(name) + " " + number(c.*size) + " m");
   }
-  const std::pair<const char*, double> multipliers[] = {
-      {"wheel_separation_multiplier", c.wheel_separation_multiplier},
-      {"left_wheel_radius_multiplier", c.left_wheel_radius_multiplier},
-      {"right_wheel_radius_multiplier", c.right_wheel_radius_multiplier}};
-  for (const auto& [name, value] : multipliers) {
-    if (value != 1) text += std::string(text.empty() ? "" : ", ") + name + " " + number(value);
+  for (const auto& [name, factor] : kControllerFactors) {
+    if (c.*factor != 1) parts.push_back(std::string(name) + " " + number(c.*factor));
   }
-  return text;
+  return joined(parts);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "common/base/constants.h"
 #include "common/base/ranges.h"
 #include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/math/algebra.h"
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/understand.h"
@@ -186,11 +187,10 @@ LinkPoses link_poses(const UrdfModel& model) {
 MassSum sum_masses(const UrdfModel& model, const LinkPoses& poses) {
   MassSum sum;
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-  std::string weightless;
+  std::vector<std::string> weightless;
   for (const UrdfLink& link : model.links) {
     if (!link.inertial) {
-      if (!link.collisions.empty())
-        weightless += (weightless.empty() ? "'" : ", '") + link.name + "'";
+      if (!link.collisions.empty()) weightless.push_back("'" + link.name + "'");
       continue;
     }
     sum.mass_kg += link.inertial->mass_kg;
@@ -206,7 +206,7 @@ MassSum sum_masses(const UrdfModel& model, const LinkPoses& poses) {
     sum.yaw_inertia_kgm2 += I_B(2, 2) + link.inertial->mass_kg * from.head<2>().squaredNorm();
   }
   if (!weightless.empty()) {
-    sum.remarks.push_back("links with a shape but without a mass: " + weightless);
+    sum.remarks.push_back("links with a shape but without a mass: " + joined(weightless));
   }
   return sum;
 }
