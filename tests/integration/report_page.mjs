@@ -122,6 +122,24 @@ async function judgeRenderer(page) {
   check(/0\.001 .*100/.test(result.words), `renderer: the log axis has the ticks ${result.words}`);
 }
 
+// A plot keeps its zoom when its data change, and shows all when another axis is chosen.
+async function judgeChoice(page) {
+  const ticks = () => page.run(`[...document.querySelectorAll("#progress-plot .canvas text")].map((t) => t.textContent).join(" ")`);
+  const choose = (value) => page.run(`(() => { const s = document.querySelector("#progress-controls select");
+    s.value = "${value}"; s.dispatchEvent(new Event("change")); })()`);
+  await choose("evaluations");
+  const all = await ticks();
+  await choose("generation");
+  await page.run(`document.querySelector("#progress-plot .canvas").focus()`);
+  await page.key("+");
+  const zoomed = await ticks();
+  await page.run("redraws.forEach((draw) => draw())");
+  check((await ticks()) === zoomed, "choice: new data take the zoom away");
+  await choose("evaluations");
+  check((await ticks()) === all, "choice: another axis keeps the zoom of the one before");
+  await choose("generation");
+}
+
 // A click on the map shows that drive below.
 async function judgeDrives(page) {
   await page.run(`document.querySelector("#floor-plot .canvas").focus()`);
@@ -160,7 +178,10 @@ try {
       await judgeKeys(page);
     }
     await judge(page, name, plots);
-    if (name === "run") await judgeRenderer(page);
+    if (name === "run") {
+      await judgeChoice(page);
+      await judgeRenderer(page);
+    }
     if (name === "wide") await page.picture("wide-error-view");
     if (name === "dark" && pictures) {
       const { data } = await page.call("Page.printToPDF", { printBackground: true });

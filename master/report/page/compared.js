@@ -5,13 +5,12 @@ function startCompared() {
   const parent = document.getElementById("compared-plot");
   if (!parent || !PAGE.compared?.length) return;
   const controls = document.getElementById("compared-controls");
-  const chart = new Chart(parent, 0.45);
-  chart.figure.classList.add("large");
+  const chart = new Chart(parent, 0.45, true);
   const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw, "against");
   const key = controls.appendChild(document.createElement("ul"));
   key.className = "key";
   key.setAttribute("aria-label", "Key");
-  function draw() {
+  function draw(keep) {
     const { of, label } = AGAINST.find((a) => a.key === against());
     const style = (i) => LINE_STYLES[i % LINE_STYLES.length];
     const lines = PAGE.compared.map(({ name, generations }, i) => ({
@@ -31,8 +30,7 @@ function startCompared() {
         { kind: "points", style: line.style, shape: "dot", faint: 0.01, name: line.name, points: all },
       ]),
       describe: ({ name, g }) => `${name}, generation ${g.generation}: best ${numberText(g.best, 6)}`,
-    }, `Best ${PAGE.fitness.name} by ${label}`, `${PAGE.fitness.higher_is_better ? "Higher" : "Lower"} is better.`, Boolean(chart.zoom));
+    }, `Best ${PAGE.fitness.name} by ${label}`, `${PAGE.fitness.higher_is_better ? "Higher" : "Lower"} is better.`, keep);
   }
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }

@@ -4,10 +4,9 @@
 function startElite() {
   const parent = document.getElementById("elite-plot");
   if (!parent || !PAGE.elite?.lines.length) return;
-  const chart = new Chart(parent, 0.5);
-  chart.figure.classList.add("large");
+  const chart = new Chart(parent, 0.5, true);
 
-  function draw() {
+  function draw(keep) {
     const { axes, lines } = PAGE.elite;
     if (!lines.length) return;
     const row = (i) => axes.length - 1 - i;  // the first at the top
@@ -30,8 +29,7 @@ function startElite() {
         const { key, unit: its, lower, upper } = axes[i];
         return `${k === 0 ? "The best, genome" : "Genome"} ${line.id}, ${numberText(line.fitness, 6)}${unit}: ${key} ${line.values[i]}${its ? ` ${its}` : ""}, of ${lower} to ${upper}`;
       },
-    }, `The best ${lines.length} of the last generation`, `Orange and bold: the best. The ends of a row are the ends of what was searched.`, Boolean(chart.zoom));
+    }, `The best ${lines.length} of the last generation`, `Orange and bold: the best. The ends of a row are the ends of what was searched.`, keep);
   }
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }

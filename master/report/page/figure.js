@@ -68,18 +68,14 @@ function scaled(axis, about, factor) {
 const charts = new Set();
 
 class Chart {
-  constructor(parent, aspect) {
+  constructor(parent, aspect, large = false) {
     this.aspect = aspect;
-    this.figure = parent.appendChild(document.createElement("figure"));
-    this.figure.className = "plot";
-    this.title = this.add("h4", "");
-    const lines = this.add("div", "words");
-    this.readout = this.add("p", "readout", lines);
-    this.readout.setAttribute("aria-live", "polite");
-    this.note = this.add("p", "note", lines);
-    this.canvas = this.add("div", "canvas");
-    this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("role", "img");
+    this.figure = element(parent, "figure", { className: large ? "plot large" : "plot" });
+    this.title = element(this.figure, "h4");
+    const lines = element(this.figure, "div", { className: "words" });
+    this.readout = element(lines, "p", { className: "readout", ariaLive: "polite" });
+    this.note = element(lines, "p", { className: "note" });
+    this.canvas = element(this.figure, "div", { className: "canvas", tabIndex: 0, role: "img" });
     this.addTools();
     this.listen();
     this.observer = new ResizeObserver(() => {
@@ -89,24 +85,14 @@ class Chart {
     charts.add(this);
   }
 
-  add(name, className, parent = this.figure) {
-    const element = parent.appendChild(document.createElement(name));
-    element.className = className;
-    return element;
-  }
-
   addTools() {
-    const tools = this.add("div", "tools");
-    const button = (text, label, action) => {
-      const b = this.add("button", "", tools);
-      Object.assign(b, { type: "button", textContent: text, title: label });
-      b.setAttribute("aria-label", label);
-      b.addEventListener("click", action);
-    };
+    const tools = element(this.figure, "div", { className: "tools" });
+    const button = (text, label, action) =>
+      element(tools, "button", { type: "button", title: label, ariaLabel: label }, text).addEventListener("click", action);
     button("+", "Zoom in", () => this.zoomBy(0.6));
     button("−", "Zoom out", () => this.zoomBy(1 / 0.6));
     button("⟲", "Show all again", () => this.zoomTo(null));
-    this.add("span", "gap", tools);
+    element(tools, "span", { className: "gap" });
     const name = () => fileName(`${document.querySelector("h1")?.dataset.file || "gapfarm"} ${this.title.textContent}`);
     button("SVG", "Save this figure as SVG", () => offer(`${name()}.svg`, "image/svg+xml", svgText(this.map.svg)));
     button("PNG", "Save this figure as PNG", () => offerPng(this.map.svg, `${name()}.png`));
@@ -152,7 +138,7 @@ class Chart {
     const beyond = outside ? ` ${outside} beyond the frame${this.zoom ? "" : " (− shows them)"}.` : "";
     this.note.textContent = this.noteText + beyond;
     const keys = "Arrow keys step through the marks, plus and minus zoom, 0 shows all.";
-    this.canvas.setAttribute("aria-label", `${this.title.textContent}. ${this.note.textContent} ${keys}`);
+    this.canvas.ariaLabel = `${this.title.textContent}. ${this.note.textContent} ${keys}`;
     this.select(null);
   }
 
@@ -185,7 +171,7 @@ class Chart {
   moveDrag(event) {
     const [[x0, y0], [x1, y1]] = [this.drag.from, this.place(event)];
     if (Math.hypot(x1 - x0, y1 - y0) < 6) return;
-    this.drag.frame ??= this.add("div", "zoom-frame", this.canvas);
+    this.drag.frame ??= element(this.canvas, "div", { className: "zoom-frame" });
     Object.assign(this.drag.frame.style, {
       left: `${Math.min(x0, x1)}px`, top: `${Math.min(y0, y1)}px`,
       width: `${Math.abs(x1 - x0)}px`, height: `${Math.abs(y1 - y0)}px`,
@@ -215,16 +201,11 @@ class Chart {
   // --- reading marks ---
 
   point(event) {
-    const [px0, py0] = this.place(event);
-    let nearest = null;
-    let best = 24 ** 2;
+    const [x, y] = this.place(event);
+    let [nearest, least] = [null, 24];
     for (const mark of this.marks) {
-      const dx = this.map.toX(mark[0]) - px0;
-      const dy = this.map.toY(mark[1]) - py0;
-      if (dx * dx + dy * dy < best) {
-        best = dx * dx + dy * dy;
-        nearest = mark;
-      }
+      const distance = Math.hypot(this.map.toX(mark[0]) - x, this.map.toY(mark[1]) - y);
+      if (distance < least) [nearest, least] = [mark, distance];
     }
     this.select(nearest);
   }
@@ -256,7 +237,7 @@ class Chart {
     this.ring?.remove();
     this.readout.textContent = mark ? this.spec.describe(mark[2]) : "";
     if (!mark) return;
-    this.ring = this.add("div", "ring", this.canvas);
+    this.ring = element(this.canvas, "div", { className: "ring" });
     this.ring.style.left = `${this.map.toX(mark[0])}px`;
     this.ring.style.top = `${this.map.toY(mark[1])}px`;
   }

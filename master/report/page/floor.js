@@ -170,8 +170,7 @@ function startFloor(trials) {
   const controls = document.getElementById("floor-controls");
   const legend = document.getElementById("floor-legend");
   const all = trials.map(floorTrial);
-  const chart = new Chart(document.getElementById("floor-plot"), 0.8);
-  chart.figure.classList.add("large");
+  const chart = new Chart(document.getElementById("floor-plot"), 0.8, true);
   const model = radios(controls, "Model", MODELS.map((m) => ({ key: m, label: MODEL_NAME[m] })), draw);
   const by = choice(controls, "Colour by error in", MEASURES.map((m) => [m.key, m.label]), draw);
   const command = choice(controls, "Command", [["all", "all"], ...commandsOf(trials).map((c) => [c, commandName(c)])], draw);

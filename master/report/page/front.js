@@ -34,11 +34,11 @@ function startFront() {
     : choice(controls, title, [...names.slice(m), ...names.slice(0, m)], draw, `front_${title.toLowerCase()}`)));
   const plot = new Chart(parent, 0.8);
   const volumes = new Chart(parent, 0.8);
-  function draw() {
+  function draw(keep) {
     const { front } = PAGE;
     if (!front.members.length) return;
     plot.show(frontSpec(Number(chosen[0]()), Number(chosen[1]())), "The front of the last generation",
-      "Blue: beaten by none; orange: their knee; grey: others that were evaluated.", Boolean(plot.zoom));
+      "Blue: beaten by none; orange: their knee; grey: others that were evaluated.", keep);
     const points = front.hypervolume;
     volumes.figure.hidden = !points.length;
     if (!points.length) return;
@@ -51,8 +51,7 @@ function startFront() {
         { kind: "points", style: "final", shape: "dot", faint: 0.3, name: "hypervolume", points: points.map(([g, v]) => [g, v, { g, v }]) },
       ],
       describe: ({ g, v }) => `generation ${g}: ${numberText(v, 6)}`,
-    }, "Hypervolume", `Within ${front.reference.map((r) => numberText(r, 4)).join(", ")}: the worst of the first generation.`, Boolean(volumes.zoom));
+    }, "Hypervolume", `Within ${front.reference.map((r) => numberText(r, 4)).join(", ")}: the worst of the first generation.`, keep);
   }
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }

@@ -14,12 +14,11 @@ function lineKey(name, style, dashed) {
 function startOperators() {
   const parent = document.getElementById("operator-plot");
   if (!parent || !PAGE.operators?.names.length) return;
-  const chart = new Chart(parent, 0.4);
-  chart.figure.classList.add("large");
+  const chart = new Chart(parent, 0.4, true);
   const key = document.getElementById("operator-key");
   // Eight lines can be distinguished, by colour and by dashes; the rest has no name of its own.
   const looks = (i) => ({ style: LINE_STYLES[i % LINE_STYLES.length], dashed: i % 2 === 1 });
-  function draw() {
+  function draw(keep) {
     const { names, generations, probabilities } = PAGE.operators;
     if (!generations.length) return;
     key.replaceChildren(...names.map((name, i) => lineKey(name, looks(i).style, looks(i).dashed)));
@@ -33,16 +32,15 @@ function startOperators() {
         { kind: "points", style: looks(i).style, shape: "dot", faint: 0.01, name, points: generations.map((g, k) => [g, 100 * probabilities[k][i], { g, name, p: probabilities[k][i] }]) },
       ]),
       describe,
-    }, "Probability of each operator", "", Boolean(chart.zoom));
+    }, "Probability of each operator", "", keep);
   }
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }
 
 // Ranges of several decades are searched by their logarithm.
 const spansDecades = (edges) => edges[0] > 0 && edges.at(-1) / edges[0] > 30;
 
-function drawGene(chart, gene) {
+function drawGene(chart, gene, keep) {
   const { key, unit, edges, generations, counts, best } = gene;
   const to = (k) => (k + 1 < generations.length ? generations[k + 1] : 2 * generations[k] - (generations[k - 1] ?? generations[k] - 1));
   const cells = [];
@@ -66,17 +64,16 @@ function drawGene(chart, gene) {
       ...[edges[0], edges.at(-1)].map((v) => ({ kind: "line", style: "quiet", dashed: true, name: "end of the range", points: [[generations[0], v], [to(generations.length - 1), v]] })),
     ],
     describe: ({ g, v }) => `generation ${g}: best ${numberText(v, 5)}${tag ? ` ${unit}` : ""}`,
-  }, key, atEnd ? "▲ The best lies at an end of the range: widen it in [genes]." : "", Boolean(chart.zoom));
+  }, key, atEnd ? "▲ The best lies at an end of the range: widen it in [genes]." : "", keep);
 }
 
 function startGenes() {
   const parent = document.getElementById("gene-plots");
   if (!parent) return;
   const charts = new Map();
-  const draw = () => (PAGE.genes || []).forEach((gene) => {
+  const draw = (keep) => (PAGE.genes || []).forEach((gene) => {
     if (!charts.has(gene.key)) charts.set(gene.key, new Chart(parent, 0.7));
-    drawGene(charts.get(gene.key), gene);
+    drawGene(charts.get(gene.key), gene, keep);
   });
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }

@@ -8,6 +8,12 @@ const EVENT_LOOK_MS = 60000;  // while it is reported
 let lookNow = () => {};
 const redraws = [];  // of plots whose data may change
 
+// Now, and whenever the data may have changed; only then the plot keeps its zoom.
+function drawLive(draw) {
+  redraws.push(() => draw(true));
+  draw(false);
+}
+
 // What a person has chosen or stands on, by what it says.
 const nameOf = (e) => e.getAttribute("href") || `${e.name || ""}=${e.value || e.id}`;
 

@@ -42,6 +42,13 @@ function numberText(value, digits = 3) {
 
 const colour = (style) => getComputedStyle(document.documentElement).getPropertyValue(`--${style}`).trim();
 
+// At the end of `parent`.
+function element(parent, name, properties = {}, text = "") {
+  const made = parent.appendChild(Object.assign(document.createElement(name), properties));
+  if (text) made.append(text);
+  return made;
+}
+
 function svgElement(parent, name, attributes, text) {
   const element = document.createElementNS(SVG_NAMESPACE, name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
@@ -79,6 +86,15 @@ function fitted(spec, width, height) {
 }
 
 const within = ({ x, y }, [px, py]) => px >= x.min && px <= x.max && py >= y.min && py <= y.max;
+
+const extent = (values) => [Math.min(...values), Math.max(...values)];
+const spaced = ({ min, max }, steps) => Array.from({ length: steps + 1 }, (_, i) => min + (i / steps) * (max - min));
+
+// An axis from `min` to `max` with room at both ends, a share of its length.
+function roomy(min, max, share) {
+  const room = share * (max - min) || 0.05 * Math.abs(max) || 1;
+  return { min: min - room, max: max + room };
+}
 
 // About `wanted` round numbers within [min, max].
 function niceTicks(min, max, wanted) {
@@ -271,6 +287,5 @@ function robustLimits(values, always = [], margin = 0.07) {
   }
   min = kept.reduce((a, b) => Math.min(a, b), min);
   max = kept.reduce((a, b) => Math.max(a, b), max);
-  const room = margin * (max - min) || 0.05 * Math.abs(max) || 1;
-  return { min: min - room, max: max + room };
+  return roomy(min, max, margin);
 }

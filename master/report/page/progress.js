@@ -12,8 +12,7 @@ function startProgress() {
   const { fitness } = PAGE;
   if (!parent || !PAGE.generations?.length) return;
   const controls = document.getElementById("progress-controls");
-  const chart = new Chart(parent, 0.45);
-  chart.figure.classList.add("large");
+  const chart = new Chart(parent, 0.45, true);
   const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw, "against");
   const all = PAGE.generations.flatMap((g) => [g.best, g.median]).filter(isNumber);
   const canLog = all.length && all.every((v) => v > 0);
@@ -21,7 +20,7 @@ function startProgress() {
     ? radios(controls, "Scale", [{ key: "linear", label: "linear" }, { key: "log", label: "log" }], draw, "scale") : () => "linear";
   if (!canLog) element(controls, "span", { className: "quiet" }, "No logarithmic scale: some values are not above 0.");
 
-  function draw() {
+  function draw(keep) {
     const { of, label } = AGAINST.find((a) => a.key === against());
     const known = PAGE.generations.filter((g) => isNumber(g.best));
     const line = (key) => known.map((g) => [of(g), g[key]]);
@@ -48,9 +47,8 @@ function startProgress() {
         describe: (g) => `generation ${g.generation}, ${numberText(g.evaluations, 6)} evaluations: best ${numberText(g.best, 6)}, median ${numberText(g.median, 4)}, worst ${numberText(g.worst, 4)}` },
       `${fitness.name} by ${label}`,
       `Line: best; dashed: median; shaded: best to worst. ${fitness.higher_is_better ? "Higher" : "Lower"} is better.`,
-      Boolean(chart.zoom),
+      keep,
     );
   }
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }

@@ -58,22 +58,19 @@ function spanSpec(timeline) {
 function startTimeline() {
   const parent = document.getElementById("timeline-plot");
   if (!parent || !PAGE.timeline?.counts.length) return;
-  const count = new Chart(parent, 0.24);
-  count.figure.classList.add("large");
+  const count = new Chart(parent, 0.24, true);
   let spans = null;
-  function draw() {
+  function draw(keep) {
     const { timeline } = PAGE;
     if (!timeline?.counts.length) return;
     const note = "Dot: joined; grey diamond: left; cross: failed; purple diamond: a master began or ended.";
-    count.show(countSpec(timeline), "Workers", note, Boolean(count.zoom));
+    count.show(countSpec(timeline), "Workers", note, keep);
     if (!timeline.spans.length) return;
     if (!spans) {
-      spans = new Chart(parent, 0.3);
-      spans.figure.classList.add("large");
+      spans = new Chart(parent, 0.3, true);
     }
     spans.aspect = Math.max(0.14, 0.028 * timeline.spans.length + 0.08);
-    spans.show(spanSpec(timeline), "From when to when each was there", "A cross at the end: it failed.", Boolean(spans.zoom));
+    spans.show(spanSpec(timeline), "From when to when each was there", "A cross at the end: it failed.", keep);
   }
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }

@@ -51,10 +51,9 @@ function startUnderstanding() {
   const across = choice(controls, "Across", most, draw, "contour_across");
   const up = choice(controls, "Up", [most[1], ...most.filter((_, k) => k !== 1)], draw, "contour_up");
   const output = outputs.length < 2 ? () => 0 : choice(controls, "Of", outputs.map(({ name }, m) => [String(m), name]), draw, "contour_of");
-  const chart = new Chart(parent, 0.6);
-  chart.figure.classList.add("large");
+  const chart = new Chart(parent, 0.6, true);
 
-  function draw() {
+  function draw(keep) {
     const { evaluated, genes: now } = PAGE.sample;
     const [gx, gy, { name, higher, of }] = [Number(across()), Number(up()), outputs[Number(output())]];
     const share = standings(evaluated, of, higher);
@@ -73,8 +72,7 @@ function startUnderstanding() {
       ],
       describe: (one) => `genome ${one[0]}: ${name} ${numberText(of(one), 6)}, ${[gx, gy].map((g) => `${now[g].key} ${numberText(geneValue(now[g], one[2][g]), 4)}`).join(", ")}`,
     }, `${name} over ${now[gx].key} and ${now[gy].key}`,
-    `The darker, the better the evaluations near, by their order; blank where there were none. Orange: the best of ${evaluated.length}.`, Boolean(chart.zoom));
+    `The darker, the better the evaluations near, by their order; blank where there were none. Orange: the best of ${evaluated.length}.`, keep);
   }
-  redraws.push(draw);
-  draw();
+  drawLive(draw);
 }

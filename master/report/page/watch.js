@@ -56,12 +56,6 @@ function watchSpec(lines, t, { outline, finger }) {
   return { ...spec, layers, equal: true };
 }
 
-function element(parent, name, properties, text) {
-  const e = parent.appendChild(Object.assign(document.createElement(name), properties));
-  if (text) e.append(text);
-  return e;
-}
-
 function startWatch() {
   const parent = document.getElementById("watch-plot");
   if (!parent) return;
@@ -83,8 +77,7 @@ function startWatch() {
   const play = element(controls, "button", { type: "button", disabled: true }, "Play");
   const scrub = element(element(controls, "label", { className: "scrub" }, "Time "), "input", { type: "range", min: 0, max: 1000, value: 1000, disabled: true });
   const caption = document.getElementById("watch-said");
-  const chart = new Chart(parent, 0.7);
-  chart.figure.classList.add("large");
+  const chart = new Chart(parent, 0.7, true);
   chart.figure.hidden = true;  // until there is a drive
   let [drive, lines, end, frame] = [null, [], 1, 0];
 
