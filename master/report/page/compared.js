@@ -7,28 +7,21 @@ function startCompared() {
   const controls = document.getElementById("compared-controls");
   const chart = new Chart(parent, 0.45, true);
   const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw, "against");
-  const key = controls.appendChild(document.createElement("ul"));
-  key.className = "key";
-  key.setAttribute("aria-label", "Key");
+  const key = element(controls, "ul", { className: "key", ariaLabel: "Key" });
   function draw(keep) {
     const { of, label } = AGAINST.find((a) => a.key === against());
-    const style = (i) => LINE_STYLES[i % LINE_STYLES.length];
-    const lines = PAGE.compared.map(({ name, generations }, i) => ({
-      name, style: style(i), dashed: i % 2 === 1, points: generations.filter((g) => isNumber(g.best)).map((g) => [of(g), g.best, { name, g }]) }));
-    key.replaceChildren(...lines.map(({ name, style: its, dashed }) => lineKey(name, its, dashed)));
-    const points = lines.flatMap((line) => line.points);
+    const lines = PAGE.compared.map(({ name, generations }) => (
+      generations.filter((g) => isNumber(g.best)).map((g) => [of(g), g.best, { name, g }])));
+    fillKey(key, PAGE.compared.map(({ name }) => name));
+    const points = lines.flat();
     if (!points.length) return;
-    const xs = points.map((p) => p[0]);
+    const [from, to] = extent(points.map((p) => p[0]));
     // A bad first generation would leave no room for what matters.
-    const ys = robustLimits(points.map((p) => p[1]), lines.map((line) => line.points.at(-1)?.[1]));
-    const unit = PAGE.fitness.unit && PAGE.fitness.unit !== "-" ? `, ${PAGE.fitness.unit}` : "";
+    const ys = robustLimits(points.map((p) => p[1]), lines.map((line) => line.at(-1)?.[1]));
     chart.show({
-      x: { min: Math.min(...xs), max: Math.max(Math.max(...xs), Math.min(...xs) + 1), label },
-      y: { ...ys, label: `best ${PAGE.fitness.name}${unit}` },
-      layers: lines.flatMap(({ points: all, ...line }) => [
-        { kind: "line", ...line, width: 2, points: all.map(([x, y]) => [x, y]) },
-        { kind: "points", style: line.style, shape: "dot", faint: 0.01, name: line.name, points: all },
-      ]),
+      x: { min: from, max: Math.max(to, from + 1), label },
+      y: { ...ys, label: withUnit(`best ${PAGE.fitness.name}`, PAGE.fitness.unit) },
+      layers: lines.flatMap((line, i) => readLine({ ...lineLook(i), name: PAGE.compared[i].name }, line)),
       describe: ({ name, g }) => `${name}, generation ${g.generation}: best ${numberText(g.best, 6)}`,
     }, `Best ${PAGE.fitness.name} by ${label}`, `${PAGE.fitness.higher_is_better ? "Higher" : "Lower"} is better.`, keep);
   }

@@ -41,16 +41,16 @@ function drivesOffered(trials) {
 }
 
 const DRIVE_LINES = [
-  { key: "tuned", pose: "tuned", dashed: true, width: 2 },
-  { key: "final", pose: "final", width: 2 },
-  { key: "measured", pose: "measured", width: 2.4 },
+  { key: "tuned", dashed: true, width: 2 },
+  { key: "final", width: 2 },
+  { key: "measured", width: 2.4 },
 ];
 
 function driveLines(drive) {
   const { trial } = drive;
   return DRIVE_LINES.map((line) => {
     const known = drive[line.key]?.length > 1;
-    const end = poseOf(trial, line.pose);
+    const end = poseOf(trial, line.key);
     const path = unwrapped(known ? drive[line.key] : arcTo(end, trial.duration_s));
     return { ...line, known, path, end, turned: path.at(-1)[3] };
   });
@@ -71,7 +71,7 @@ function wayLayers(drive, lines) {
   const reach = Math.max(20, ...lines.map(({ end }) => 1000 * Math.hypot(end.x, end.y)));
   for (const { key, end } of lines) {
     layers.push({ kind: "arrows", style: key, width: 2, arrows: [tick(end, 0.08 * reach)], name: `${key} end and heading` });
-    layers.push({ kind: "points", shape: { measured: "cross", tuned: "diamond", final: "dot" }[key], style: key, points: [[1000 * end.x, 1000 * end.y]] });
+    layers.push({ kind: "points", shape: SHAPE[key], style: key, points: [[1000 * end.x, 1000 * end.y]] });
   }
   layers.push({ kind: "arrows", style: "quiet", width: 2, arrows: [tick({ x: 0, y: 0, theta: 0 }, 0.08 * reach)], name: "start" });
   return layers;
@@ -86,7 +86,7 @@ function headingLayers(drive, lines) {
       const half = degrees(1.645 * Math.sqrt(Math.max(drive.trial[`${key}_cov_tt`], 0)));
       layers.push({ kind: "line", style: key, points: [[at, degrees(whole) - half], [at, degrees(whole) + half]], width: 3 });
     }
-    layers.push({ kind: "points", shape: { measured: "cross", tuned: "diamond", final: "dot" }[key], style: key, points: [[at, degrees(whole)]] });
+    layers.push({ kind: "points", shape: SHAPE[key], style: key, points: [[at, degrees(whole)]] });
   }
   return layers;
 }
@@ -95,7 +95,7 @@ function framed(layers, labels) {
   const points = layers.flatMap((l) => (l.points || l.arrows.flatMap(([a, b, c, d]) => [[a, b], [c, d]])));
   const axis = (k) => {
     const values = points.map((p) => p[k]).filter(isNumber);
-    const [min, max] = [Math.min(...values), Math.max(...values)];
+    const [min, max] = extent(values);
     const room = 0.08 * (max - min) || 1;
     return { min: min - room, max: max + room, label: labels[k] };
   };
@@ -113,8 +113,7 @@ function startDrives(trials) {
   if (!offered.length) return;
   const chooser = choice(controls, "Drive", offered.map((d, i) => [String(i), d.why]), draw);
   const select = controls.querySelector("select");
-  const caption = controls.appendChild(document.createElement("p"));
-  caption.className = "quiet";
+  const caption = element(controls, "p", { className: "quiet" });
 
   function draw() {
     const drive = offered[Number(chooser())];

@@ -10,14 +10,13 @@ function startElite() {
     const { axes, lines } = PAGE.elite;
     if (!lines.length) return;
     const row = (i) => axes.length - 1 - i;  // the first at the top
-    const unit = PAGE.fitness.unit && PAGE.fitness.unit !== "-" ? ` ${PAGE.fitness.unit}` : "";
     chart.aspect = Math.max(0.3, 0.055 * axes.length + 0.08);
     const layers = axes.map((axis, i) => ({ kind: "line", style: "grid", width: 2, name: axis.key, points: [[0, row(i)], [1, row(i)]] }));
     // The best is drawn last, over the others.
     [...lines.entries()].reverse().forEach(([k, line]) => {
       const points = line.shares.map((share, i) => [share, row(i), { line, i, k }]);
       const look = k === 0 ? { style: "tuned", width: 2.6 } : { style: "final", width: 1.3, faint: 0.35 };
-      layers.push({ kind: "line", ...look, name: `genome ${line.id}`, points: points.map(([x, y]) => [x, y]) });
+      layers.push({ kind: "line", ...look, name: `genome ${line.id}`, points });
       layers.push({ kind: "points", style: look.style, shape: "dot", faint: k === 0 ? 1 : 0.4, name: `genome ${line.id}`, points });
     });
     chart.show({
@@ -26,8 +25,9 @@ function startElite() {
         ticks: axes.map(({ key }, i) => [row(i), key.length > 24 ? `${key.slice(0, 23)}…` : key]) },
       layers,
       describe: ({ line, i, k }) => {
-        const { key, unit: its, lower, upper } = axes[i];
-        return `${k === 0 ? "The best, genome" : "Genome"} ${line.id}, ${numberText(line.fitness, 6)}${unit}: ${key} ${line.values[i]}${its ? ` ${its}` : ""}, of ${lower} to ${upper}`;
+        const { key, unit, lower, upper } = axes[i];
+        const fitness = withUnit(numberText(line.fitness, 6), PAGE.fitness.unit, " ");
+        return `${k === 0 ? "The best, genome" : "Genome"} ${line.id}, ${fitness}: ${key} ${withUnit(line.values[i], unit, " ")}, of ${lower} to ${upper}`;
       },
     }, `The best ${lines.length} of the last generation`, `Orange and bold: the best. The ends of a row are the ends of what was searched.`, keep);
   }

@@ -71,11 +71,9 @@ function lensLayers(frame) {
     const r2 = (x - cx) ** 2 + (y - cy) ** 2;
     return [x + times * k1 * r2 * (x - cx), y + times * k1 * r2 * (y - cy)];
   };
-  const steps = (axis) => Array.from({ length: 7 }, (_, i) => axis.min + (i / 6) * (axis.max - axis.min));
-  const along = (axis) => Array.from({ length: 41 }, (_, i) => axis.min + (i / 40) * (axis.max - axis.min));
   const lines = [
-    ...steps(frame.x).map((x) => along(frame.y).map((y) => seen(x, y))),
-    ...steps(frame.y).map((y) => along(frame.x).map((x) => seen(x, y))),
+    ...spaced(frame.x, 6).map((x) => spaced(frame.y, 40).map((y) => seen(x, y))),
+    ...spaced(frame.y, 6).map((y) => spaced(frame.x, 40).map((x) => seen(x, y))),
   ];
   const label = { kind: "text", style: "place", text: `lens, bent ${numberText(times)} times`, points: [[cx, cy]], anchor: "middle" };
   return [...lines.map((points) => ({ kind: "line", style: "place", points, width: 1, faint: true, name: "lens" })), label];
@@ -156,12 +154,12 @@ function fillLegend(legend, ends, measure) {
     if (i === ends.length) return `over ${numberText(ends.at(-1), 2)} ${measure.unit}`;
     return `${numberText(ends[i - 1], 2)} to ${numberText(ends[i], 2)}`;
   };
-  legend.replaceChildren(...Array.from({ length: ends.length + 1 }, (_, i) => {
-    const item = document.createElement("li");
-    item.appendChild(document.createElement("span")).className = `chip chip-${i}`;
+  legend.replaceChildren();
+  for (let i = 0; i <= ends.length; ++i) {
+    const item = element(legend, "li");
+    element(item, "span", { className: `chip chip-${i}` });
     item.append(text(i));
-    return item;
-  }));
+  }
 }
 
 function startFloor(trials) {
@@ -196,7 +194,7 @@ function startFloor(trials) {
         describe: describeTrial, picked: showDrive },
       `Errors of the ${MODEL_NAME[model()]} model on the floor`,
       `${some.length} drives, from start to end${visible.has("errors") ? `; errors ${numberText(times)} times as long as they are` : ""}.`,
-      keep === true,
+      keep,
     );
   }
   draw();

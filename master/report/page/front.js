@@ -4,10 +4,8 @@
 function frontSpec(x, y) {
   const { objectives, members, knee } = PAGE.front;
   const axis = (m) => {
-    const values = members.map(({ values: all }) => all[m]);
-    const [min, max] = [Math.min(...values), Math.max(...values)];
-    const room = 0.06 * (max - min) || 0.05 * Math.abs(max) || 1;
-    return { min: min - room, max: max + room, label: `${objectives[m].name}, ${objectives[m].maximise ? "higher" : "lower"} is better` };
+    const range = extent(members.map(({ values }) => values[m]));
+    return { ...roomy(...range, 0.06), label: `${objectives[m].name}, ${objectives[m].maximise ? "higher" : "lower"} is better` };
   };
   const marks = members.map((member, k) => [member.values[x], member.values[y], { member, k }]);
   const evaluated = (PAGE.sample?.evaluated || []).filter((one) => one[3].length > Math.max(x, y));
@@ -15,7 +13,7 @@ function frontSpec(x, y) {
     x: axis(x), y: axis(y),
     layers: [
       { kind: "points", style: "quiet", shape: "dot", faint: 0.35, name: "evaluated", points: evaluated.map((one) => [one[3][x], one[3][y]]) },
-      { kind: "line", style: "final", width: 1.2, faint: 0.5, name: "front", points: objectives.length === 2 ? marks.map(([a, b]) => [a, b]) : [] },
+      { kind: "line", style: "final", width: 1.2, faint: 0.5, name: "front", points: objectives.length === 2 ? marks : [] },
       { kind: "points", style: "final", shape: "dot", name: "front", points: marks.filter((_, k) => k !== knee) },
       { kind: "points", style: "tuned", shape: "diamond", name: "knee", points: [marks[knee]] },
       { kind: "text", style: "tuned", text: "knee", points: [marks[knee].slice(0, 2)] },
@@ -42,10 +40,10 @@ function startFront() {
     const points = front.hypervolume;
     volumes.figure.hidden = !points.length;
     if (!points.length) return;
-    const ys = points.map((p) => p[1]);
+    const [least, most] = extent(points.map((p) => p[1]));
     volumes.show({
       x: { min: points[0][0], max: Math.max(points.at(-1)[0], points[0][0] + 1), label: "generation" },
-      y: { min: Math.min(...ys), max: Math.max(...ys) * 1.02 || 1, label: "hypervolume" },
+      y: { min: least, max: most * 1.02 || 1, label: "hypervolume" },
       layers: [
         { kind: "line", style: "final", width: 2, name: "hypervolume", points },
         { kind: "points", style: "final", shape: "dot", faint: 0.3, name: "hypervolume", points: points.map(([g, v]) => [g, v, { g, v }]) },

@@ -3,35 +3,42 @@
 
 const LINE_STYLES = ["final", "tuned", "place", "scale-2", "scale-3", "quiet", "scale-4", "scale-1"];
 
-function lineKey(name, style, dashed) {
-  const item = document.createElement("li");
-  const svg = svgElement(item, "svg", { class: "mark", "aria-hidden": "true" });
-  svgElement(svg, "path", { d: "M1 10h18", stroke: `var(--${style})`, "stroke-dasharray": dashed ? "4 3" : "none" });
-  item.append(name);
-  return item;
+// Eight lines can be distinguished, by colour and by dashes; the rest has no name of its own.
+const lineLook = (i) => ({ style: LINE_STYLES[i % LINE_STYLES.length], dashed: i % 2 === 1 });
+
+function fillKey(key, names) {
+  key.replaceChildren();
+  names.forEach((name, i) => {
+    const { style, dashed } = lineLook(i);
+    const item = element(key, "li");
+    const svg = svgElement(item, "svg", { class: "mark", "aria-hidden": "true" });
+    svgElement(svg, "path", { d: "M1 10h18", stroke: `var(--${style})`, "stroke-dasharray": dashed ? "4 3" : "none" });
+    item.append(name);
+  });
 }
+
+// A line through `points`, each of which can be pointed at.
+const readLine = (line, points) => [
+  { kind: "line", width: 2, ...line, points },
+  { kind: "points", shape: "dot", faint: 0.01, style: line.style, name: line.name, points },
+];
 
 function startOperators() {
   const parent = document.getElementById("operator-plot");
   if (!parent || !PAGE.operators?.names.length) return;
   const chart = new Chart(parent, 0.4, true);
   const key = document.getElementById("operator-key");
-  // Eight lines can be distinguished, by colour and by dashes; the rest has no name of its own.
-  const looks = (i) => ({ style: LINE_STYLES[i % LINE_STYLES.length], dashed: i % 2 === 1 });
   function draw(keep) {
     const { names, generations, probabilities } = PAGE.operators;
     if (!generations.length) return;
-    key.replaceChildren(...names.map((name, i) => lineKey(name, looks(i).style, looks(i).dashed)));
+    fillKey(key, names);
     const most = Math.max(...probabilities.flat().filter(isNumber), 0.01);
-    const describe = ({ g, name, p }) => `generation ${g}: ${name} ${numberText(100 * p, 3)} %`;
     chart.show({
       x: { min: generations[0], max: Math.max(generations.at(-1), generations[0] + 1), label: "generation" },
       y: { min: 0, max: 105 * most, label: "probability, %" },
-      layers: names.flatMap((name, i) => [
-        { kind: "line", ...looks(i), width: 2, name, points: generations.map((g, k) => [g, 100 * probabilities[k][i]]) },
-        { kind: "points", style: looks(i).style, shape: "dot", faint: 0.01, name, points: generations.map((g, k) => [g, 100 * probabilities[k][i], { g, name, p: probabilities[k][i] }]) },
-      ]),
-      describe,
+      layers: names.flatMap((name, i) => readLine({ ...lineLook(i), name },
+        generations.map((g, k) => [g, 100 * probabilities[k][i], { g, name, p: probabilities[k][i] }]))),
+      describe: ({ g, name, p }) => `generation ${g}: ${name} ${numberText(100 * p, 3)} %`,
     }, "Probability of each operator", "", keep);
   }
   drawLive(draw);
@@ -50,20 +57,18 @@ function drawGene(chart, gene, keep) {
   });
   const log = spansDecades(edges);
   const room = log ? 0 : 0.03 * (edges.at(-1) - edges[0]);
-  const tag = unit && unit !== "-" ? `, ${unit}` : "";
   const share = (best.at(-1) - edges[0]) / (edges.at(-1) - edges[0]);
   const atEnd = share < 0.001 || share > 0.999;
   const middle = generations.map((g, k) => (g + to(k)) / 2);
   chart.show({
     x: { min: generations[0], max: Math.max(to(generations.length - 1), generations[0] + 1), label: "generation" },
-    y: { min: log ? edges[0] / 1.1 : edges[0] - room, max: log ? edges.at(-1) * 1.1 : edges.at(-1) + room, log, label: `${key}${tag}` },
+    y: { min: log ? edges[0] / 1.1 : edges[0] - room, max: log ? edges.at(-1) * 1.1 : edges.at(-1) + room, log, label: withUnit(key, unit) },
     layers: [
       { kind: "cells", style: "final", cells, name: "share of the population" },
-      { kind: "line", style: "tuned", width: 2, name: "best", points: best.map((v, k) => [middle[k], v]) },
-      { kind: "points", style: "tuned", shape: "dot", faint: 0.01, name: "best", points: best.map((v, k) => [middle[k], v, { g: generations[k], v }]) },
+      ...readLine({ style: "tuned", name: "best" }, best.map((v, k) => [middle[k], v, { g: generations[k], v }])),
       ...[edges[0], edges.at(-1)].map((v) => ({ kind: "line", style: "quiet", dashed: true, name: "end of the range", points: [[generations[0], v], [to(generations.length - 1), v]] })),
     ],
-    describe: ({ g, v }) => `generation ${g}: best ${numberText(v, 5)}${tag ? ` ${unit}` : ""}`,
+    describe: ({ g, v }) => `generation ${g}: best ${withUnit(numberText(v, 5), unit, " ")}`,
   }, key, atEnd ? "▲ The best lies at an end of the range: widen it in [genes]." : "", keep);
 }
 

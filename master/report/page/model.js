@@ -19,6 +19,7 @@ function readTrials() {
 const PAGE = readJson("page");
 const MODELS = ["tuned", "final"];
 const MODEL_NAME = PAGE.models;
+const SHAPE = { measured: "cross", tuned: "diamond", final: "dot" };
 const AXES = ["x", "y", "theta"];
 const UNIT = { x: "mm", y: "mm", theta: "mrad" };
 const COMPONENT = { x: "along x", y: "along y", theta: "heading" };

@@ -1,73 +1,58 @@
 "use strict";
 // Controls, theme and print; starts the plots.
 
-function labelled(parent, input, text) {
-  const label = parent.appendChild(document.createElement("label"));
-  label.append(input, text);
-  return input;
-}
-
-function fieldset(parent, title) {
-  const set = parent.appendChild(document.createElement("fieldset"));
-  set.appendChild(document.createElement("legend")).textContent = title;
-  return set;
-}
-
-// Each control returns a function that reads it.  Where it has a `place` its choice stands there in
-// the address.
-function radios(parent, title, options, changed, place) {
-  const set = fieldset(parent, title);
-  const known = place && options.some(({ key }) => key === address.get(place)) ? address.get(place) : options[0].key;
-  const inputs = options.map(({ key, label }) => {
-    const input = Object.assign(document.createElement("input"), { type: "radio", name: title, value: key, checked: key === known });
-    input.addEventListener("change", () => {
-      if (place) address.set({ [place]: key === options[0].key ? "" : key });
-      changed();
-    });
-    return labelled(set, input, label);
+// Inputs with their labels, one an option.
+function fieldset(parent, title, options, properties) {
+  const set = element(parent, "fieldset");
+  element(set, "legend", {}, title);
+  return options.map(({ key, label }) => {
+    const labelled = element(set, "label");
+    const input = element(labelled, "input", { ...properties, value: key });
+    labelled.append(label);
+    return input;
   });
-  if (place) {
-    address.follow(() => {
-      const again = inputs.find((input) => input.value === address.get(place)) || inputs[0];
-      if (again.checked) return;
-      again.checked = true;
-      changed();
-    });
-  }
-  return () => inputs.find((input) => input.checked).value;
+}
+
+// Of a control that chooses one of `values`: what to do when a person has chosen.  Where it has a
+// `place` the choice stands there in the address, but for the first, and follows it.
+function chosen(read, write, values, changed, place) {
+  const known = () => (place && values.includes(address.get(place)) ? address.get(place) : values[0]);
+  write(known());
+  if (!place) return () => changed();
+  address.follow(() => {
+    if (read() === known()) return;
+    write(known());
+    changed();
+  });
+  return () => {
+    address.set({ [place]: read() === values[0] ? "" : read() });
+    changed();
+  };
+}
+
+// Each control returns a function that reads it.
+function radios(parent, title, options, changed, place) {
+  const inputs = fieldset(parent, title, options, { type: "radio", name: title });
+  const read = () => inputs.find((input) => input.checked).value;
+  const write = (value) => { inputs.find((input) => input.value === value).checked = true; };
+  const chose = chosen(read, write, options.map(({ key }) => key), changed, place);
+  for (const input of inputs) input.addEventListener("change", chose);
+  return read;
 }
 
 function checks(parent, title, keys, changed) {
-  const set = fieldset(parent, title);
-  const inputs = keys.map((key) => {
-    const input = Object.assign(document.createElement("input"), { type: "checkbox", value: key, checked: true });
-    input.addEventListener("change", changed);
-    return labelled(set, input, MODEL_NAME[key] || key);
-  });
+  const options = keys.map((key) => ({ key, label: MODEL_NAME[key] || key }));
+  const inputs = fieldset(parent, title, options, { type: "checkbox", checked: true });
+  for (const input of inputs) input.addEventListener("change", () => changed());
   return () => inputs.filter((input) => input.checked).map((input) => input.value);
 }
 
 function choice(parent, title, options, changed, place) {
-  const label = parent.appendChild(document.createElement("label"));
-  const select = document.createElement("select");
+  const select = element(element(parent, "label", {}, `${title} `), "select");
   for (const [value, text] of options) select.add(new Option(text, value));
-  if (place && options.some(([value]) => value === address.get(place))) select.value = address.get(place);
-  select.addEventListener("change", () => {
-    if (place) address.set({ [place]: select.value === options[0][0] ? "" : select.value });
-    changed();
-  });
-  if (place) {
-    address.follow(() => {
-      const known = options.map(([value]) => value);
-      const again = known.includes(address.get(place)) ? address.get(place) : known[0];
-      if (select.value === again) return;
-      select.value = again;
-      changed();
-    });
-  }
-  label.append(`${title} `, select);
   const read = () => select.value;
   read.set = (value) => { select.value = value; };
+  select.addEventListener("change", chosen(read, read.set, options.map(([value]) => value), changed, place));
   return read;
 }
 

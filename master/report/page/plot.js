@@ -40,6 +40,9 @@ function numberText(value, digits = 3) {
   return (value < 0 && text !== "0" ? "−" : "") + text;
 }
 
+// "friction", "full_speed, m/s".
+const withUnit = (text, unit, between = ", ") => (unit && unit !== "-" ? text + between + unit : text);
+
 const colour = (style) => getComputedStyle(document.documentElement).getPropertyValue(`--${style}`).trim();
 
 // At the end of `parent`.

@@ -92,7 +92,7 @@ function errorSpec(trials, shown, [a, b]) {
   for (const model of MODELS.filter((m) => shown.has(m))) {
     const at = (t) => [1000 * t[`${model}_residual_${a}`], 1000 * t[`${model}_residual_${b}`]];
     if (shown.has("measured")) {
-      layers.push({ kind: "points", shape: model === "tuned" ? "diamond" : "dot", style: model,
+      layers.push({ kind: "points", shape: SHAPE[model], style: model,
                     points: trials.map((t) => [...at(t), t]), faint: true });
     }
     const cov = mixture(trials.map(() => [0, 0]), trials.map((t) => block(t, model, a, b).map((v) => 1e6 * v))).cov;

@@ -30,14 +30,12 @@ function startProgress() {
     const medians = known.map((g) => g.median).filter(isNumber).sort((a, b) => a - b);
     const usual = medians.length ? [quantile(medians, fitness.higher_is_better ? 0.1 : 0.9)] : [];
     const values = [...known.map((g) => g.best), ...usual];
-    const [min, max] = [Math.min(...values), Math.max(...values)];
-    const room = 0.06 * (max - min) || 0.05 * Math.abs(max) || 1;
+    const [min, max] = extent(values);
     const log = scale() === "log";
-    const xs = known.map(of);
-    const unit = fitness.unit && fitness.unit !== "-" ? `, ${fitness.unit}` : "";
+    const [from, to] = extent(known.map(of));
     chart.show(
-      { x: { min: Math.min(...xs), max: Math.max(...xs) > Math.min(...xs) ? Math.max(...xs) : Math.min(...xs) + 1, label },
-        y: { min: log ? min / 1.05 : min - room, max: log ? max * 1.05 : max + room, log, label: `${fitness.name}${unit}` },
+      { x: { min: from, max: to > from ? to : from + 1, label },
+        y: { ...(log ? { min: min / 1.05, max: max * 1.05 } : roomy(min, max, 0.06)), log, label: withUnit(fitness.name, fitness.unit) },
         layers: [
           { kind: "band", style: "final", points: known.map((g) => [of(g), Math.min(low(g), g.best), Math.max(low(g), g.best)]), name: "best to worst" },
           { kind: "line", style: "quiet", points: line("median"), dashed: true, name: "median" },

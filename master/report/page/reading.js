@@ -4,10 +4,7 @@
 // --- terms: links into the glossary, whose entry shows beside the word ---
 
 function startTerms() {
-  const tip = document.body.appendChild(document.createElement("div"));
-  tip.id = "tip";
-  tip.setAttribute("role", "tooltip");
-  tip.hidden = true;
+  const tip = element(document.body, "div", { id: "tip", role: "tooltip", hidden: true });
   const hide = () => { tip.hidden = true; };
 
   function show(link) {

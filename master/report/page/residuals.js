@@ -20,10 +20,9 @@ function binned(points, most = 9) {
 function residualLayers(trials, model, covariate, component) {
   const points = trials.map((t) => [covariate.of(t), 1000 * t[`${model}_residual_${component}`], t]);
   const bins = binned(points);
-  const shape = model === "tuned" ? "diamond" : "dot";
   const line = [{ kind: "line", style: model, points: bins.map((b) => [b.x, b.y]), dashed: model === "tuned", width: 2.5 }];
   const bars = bins.map((b) => ({ kind: "line", style: model, points: [[b.x, b.y - b.half], [b.x, b.y + b.half]], width: 2 }));
-  return { marks: { kind: "points", shape, style: model, points, faint: true }, over: [...line, ...bars], bins, model };
+  return { marks: { kind: "points", shape: SHAPE[model], style: model, points, faint: true }, over: [...line, ...bars], bins, model };
 }
 
 // Each model's name at the end of its line: the upper one above it, the other below.
@@ -42,7 +41,7 @@ function showResidual(chart, trials, models, covariate, component) {
   const y = robustLimits(layers.flatMap((l) => l.marks.points.map((p) => p[1])),
     [0, ...layers.flatMap((l) => l.bins.flatMap((b) => [b.y - b.half, b.y + b.half]))]);
   const xs = trials.map(covariate.of).filter(isNumber);
-  const [from, to] = xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 1];
+  const [from, to] = xs.length ? extent(xs) : [0, 1];
   const margin = 0.04 * (to - from) || 0.5;
   const zero = { kind: "line", style: "quiet", points: [[from - margin, 0], [to + margin, 0]], width: 1 };
   chart.show(

@@ -32,7 +32,7 @@ const distinct = (values) => [...new Set(values)].sort((a, b) => a - b);
 function reachOf(term, j) {
   if (SHAPE_CYCLIC.has(term.covariates[j])) return { min: -Math.PI, max: Math.PI };
   const values = term.centres.map((centre) => centre[j]);
-  const [min, max] = [Math.min(...values), Math.max(...values)];
+  const [min, max] = extent(values);
   return max > min ? { min, max } : { min: min - 1, max: max + 1 };
 }
 
@@ -58,8 +58,7 @@ function floorShape(term, weights) {
   const [jx, jy] = [term.covariates.indexOf("x"), term.covariates.indexOf("y")];
   const [x, y] = [reachOf(term, jx), reachOf(term, jy)];
   const z = middleOf(term);
-  const steps = (axis) => Array.from({ length: 13 }, (_, i) => axis.min + (i / 12) * (axis.max - axis.min));
-  const shifts = steps(x).flatMap((px) => steps(y).map((py) => {
+  const shifts = spaced(x, 12).flatMap((px) => spaced(y, 12).map((py) => {
     z[jx] = px;
     z[jy] = py;
     return [px, py, ...shiftAt(term, weights, z)];
@@ -76,9 +75,8 @@ function floorShape(term, weights) {
     if (arrows.length) layers.push({ kind: "arrows", style: `scale-${i}`, width: 1.6, head: 6, arrows, name: `shift times ${times}` });
   }
   const colours = term.frame === "readings" ? "" : ` Colours: turned by up to ${numberText(shownFactor(term) * turns, 2)} ${unitOf(term, "theta")}.`;
-  const room = (axis) => ({ min: axis.min - 0.08 * (axis.max - axis.min), max: axis.max + 0.08 * (axis.max - axis.min) });
   return [{
-    spec: { x: { ...room(x), label: SHAPE_LABEL.x }, y: { ...room(y), label: SHAPE_LABEL.y }, equal: true, layers },
+    spec: { x: { ...roomy(x.min, x.max, 0.08), label: SHAPE_LABEL.x }, y: { ...roomy(y.min, y.max, 0.08), label: SHAPE_LABEL.y }, equal: true, layers },
     title: "Shift over the floor",
     note: `Up to ${numberText(shownFactor(term) * longest, 2)} ${unitOf(term, "x")} ${shapePer(term)}, drawn ${times === 1 ? "to scale" : `${numberText(times, 2)} times as long`}; ${shapeFrame(term)}.${colours}`,
   }];
@@ -88,7 +86,6 @@ function floorShape(term, weights) {
 
 function curveShape(term, weights) {
   const reach = reachOf(term, 0);
-  const at = Array.from({ length: 61 }, (_, i) => reach.min + (i / 60) * (reach.max - reach.min));
   const seconds = term.covariates.length > 1 ? distinct(term.centres.map((c) => c[1])) : [0];
   const every = Math.ceil(seconds.length / MOST_LINES);
   const kept = seconds.filter((_, i) => i % every === 0);
@@ -97,7 +94,7 @@ function curveShape(term, weights) {
     const lines = kept.map((second, i) => {
       const z = middleOf(term);
       if (term.covariates.length > 1) z[1] = second;
-      const points = at.map((v) => {
+      const points = spaced(reach, 60).map((v) => {
         z[0] = v;
         return [v, shownFactor(term) * shiftAt(term, weights, z)[c]];
       });
@@ -127,7 +124,7 @@ function startShape() {
   const which = choice(controls, "Term", terms.map((t, i) =>
     [String(i), `${i + 1}: by ${t.covariates.map((name) => SHAPE_LABEL[name].split(",")[0]).join(" and ")}`]), draw);
   const command = choice(controls, "Command",
-    distinctLabels(terms.flatMap((t) => Object.keys(t.weights))).map((c) => [c, commandName(c)]), draw);
+    [...new Set(terms.flatMap((t) => Object.keys(t.weights)))].map((c) => [c, commandName(c)]), draw);
 
   function draw() {
     const term = terms[Number(which())];
@@ -145,5 +142,3 @@ function startShape() {
   }
   draw();
 }
-
-const distinctLabels = (list) => [...new Set(list)];

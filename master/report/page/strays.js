@@ -36,8 +36,6 @@ function startOutliers(trials) {
   const { chances } = PAGE.residual.strays;
   const drives = trials.map((trial, i) => ({ ...floorTrial(trial), chance: chances[i] })).filter((d) => isNumber(d.chance));
   for (const { spec, title, note } of [outlierMap(drives), outlierTimes(drives)]) {
-    const panel = new Chart(parent, 0.8);
-    panel.figure.classList.toggle("large", Boolean(spec.equal));
-    panel.show(spec, title, note);
+    new Chart(parent, 0.8, spec.equal).show(spec, title, note);
   }
 }

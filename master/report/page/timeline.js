@@ -1,11 +1,11 @@
 "use strict";
 // Of a run: which workers were there, who came, who went and who failed.
 
-const CAME = {
-  joined: { style: "final", shape: "dot", label: "joined" },
-  left: { style: "quiet", shape: "diamond", label: "left" },
-  failed: { style: "tuned", shape: "cross", label: "failed" },
-  master: { style: "place", shape: "diamond", label: "a master began or ended" },
+const CAME = {  // by what a mark is of
+  joined: { style: "final", shape: "dot" },
+  left: { style: "quiet", shape: "diamond" },
+  failed: { style: "tuned", shape: "cross" },
+  master: { style: "place", shape: "diamond" },
 };
 
 // Minutes or hours since the run began, whichever is easier to read.

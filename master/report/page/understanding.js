@@ -59,7 +59,7 @@ function startUnderstanding() {
     const share = standings(evaluated, of, higher);
     const best = evaluated[share.indexOf(Math.max(...share))];
     const axis = (g) => ({
-      min: 0, max: 1, label: `${now[g].key}${now[g].unit ? `, ${now[g].unit}` : ""}`,
+      min: 0, max: 1, label: withUnit(now[g].key, now[g].unit),
       ticks: [0, 0.25, 0.5, 0.75, 1].map((s) => [s, numberText(geneValue(now[g], s), 3)]),
     });
     const mark = (one) => [one[2][gx], one[2][gy], one];
