@@ -65,12 +65,31 @@ std::string top(const PageFrame& frame) {
       html_escaped(frame.brand), links);
 }
 
+// A key to the marks of the plots, by what the page calls the models.
+std::string plot_key(const ModelNames& models, bool measured) {
+  std::string items;
+  if (measured) {
+    items =
+        R"(<li><svg class="mark" aria-hidden="true"><path class="measured" d="M7 7l6 6M13 7l-6 6"/></svg>measured</li>)";
+  }
+  return fmt::format(
+      R"(<ul class="key" aria-label="Key">{}<li><svg class="mark" aria-hidden="true"><path class="tuned" d="M1 10h18"/><path class="tuned solid" d="M10 5.5l4.5 4.5-4.5 4.5-4.5-4.5z"/></svg>{}</li>
+<li><svg class="mark" aria-hidden="true"><path class="final" d="M1 10h18"/><circle class="final" cx="10" cy="10" r="3.5"/></svg>{}</li></ul>)",
+      items, models.tuned, models.final_);
+}
+
 std::string data_block(const char* id, const Json& json) {
   return fmt::format("<script type=\"application/json\" id=\"{}\">{}</script>\n", id,
                      script_safe(json_text(json)));
 }
 
 }  // namespace
+
+void PageFrame::add(const char* id, const char* place, const std::string& section) {
+  if (section.empty()) return;
+  places.emplace_back(id, place);
+  body += section;
+}
 
 void PlainPage::heading(std::string_view content) {
   body_ += fmt::format("<h2>{}</h2>\n", html_escaped(content));
@@ -115,19 +134,16 @@ std::string PlainPage::finish() const {
 const char* const kNoScript =
     R"(<noscript><p class="quiet">The plots need scripts; the tables do not.</p></noscript>)";
 
-std::string plot_key(std::string_view items) {
-  return fmt::format(R"(<ul class="key" aria-label="Key">{}</ul>)", items);
-}
-
-std::string measured_key() {
-  return R"(<li><svg class="mark" aria-hidden="true"><path class="measured" d="M7 7l6 6M13 7l-6 6"/></svg>measured</li>)";
-}
-
-std::string model_keys(std::string_view tuned, std::string_view final_) {
+std::string plot_area(std::string_view name) {
   return fmt::format(
-      R"(<li><svg class="mark" aria-hidden="true"><path class="tuned" d="M1 10h18"/><path class="tuned solid" d="M10 5.5l4.5 4.5-4.5 4.5-4.5-4.5z"/></svg>{}</li>
-<li><svg class="mark" aria-hidden="true"><path class="final" d="M1 10h18"/><circle class="final" cx="10" cy="10" r="3.5"/></svg>{}</li>)",
-      tuned, final_);
+      R"(<div class="controls" id="{0}-controls"></div><div id="{0}-plot"></div>{1})", name,
+      kNoScript);
+}
+
+std::string plot_grid(std::string_view name) {
+  return fmt::format(
+      R"(<div class="controls" id="{0}-controls"></div><div class="grid" id="{0}-plots"></div>{1})",
+      name, kNoScript);
 }
 
 std::string floor_section() {
@@ -139,12 +155,24 @@ std::string floor_section() {
   return html + "</section>\n";
 }
 
-std::string drives_section(std::string_view tuned, std::string_view final_) {
+std::string drives_section(const ModelNames& models) {
   return R"(<section id="drives"><h2>One real drive over the simulated ones</h2>
 <p>The worst and the median drive, by the first model's log score.</p>)" +
-         plot_key(measured_key() + model_keys(tuned, final_)) +
-         R"(<div class="controls" id="drive-controls"></div><div class="grid two" id="drive-plots"></div>)" +
-         kNoScript + "</section>\n";
+         plot_key(models, true) + plot_grid("drive") + "</section>\n";
+}
+
+std::string poses_section(std::string_view heading, std::string_view text,
+                          const ModelNames& models) {
+  return fmt::format("<section id=\"poses\"><h2>{}</h2>\n<p>{}</p>{}{}</section>\n", heading, text,
+                     plot_key(models, true), plot_grid("pose"));
+}
+
+std::string residual_plots(std::string_view heading, std::string_view text,
+                           const ModelNames& models) {
+  return fmt::format(
+      "<h3 id=\"residual-title\">{}</h3>\n<p>{} Lines join the means of neighbouring trials, with "
+      "90 % intervals.</p>{}{}</section>\n",
+      heading, text, plot_key(models, false), plot_grid("residual"));
 }
 
 std::string watch_section(std::string_view what) {
@@ -155,7 +183,7 @@ std::string watch_section(std::string_view what) {
              R"(<section id="watch"><h2>Watch a {}</h2>
 <p>{}, seen from above: as it was measured, and as the config's values and the best of a generation have it without chance. The server simulates what is asked for.</p>)",
              what, any) +
-         plot_key(measured_key() + model_keys("before", "best")) +
+         plot_key({"before", "best"}, true) +
          R"(<div class="controls" id="watch-controls"></div><p class="quiet" id="watch-said" role="status"></p><div id="watch-plot"></div>)" +
          kNoScript + "</section>\n";
 }

@@ -16,6 +16,8 @@ struct PageFrame {
   std::string brand;                                        // "diagnosis", "run"
   std::vector<std::pair<const char*, const char*>> places;  // of the navigation: id and words
   std::string body;                                         // sections
+  // A section, and its place in the navigation; nothing where it is empty.
+  void add(const char* id, const char* place, const std::string& section);
   // By a server: the page has a way back to the list and looks again while it is open.
   bool served = false;
 };
@@ -24,18 +26,26 @@ struct PageFrame {
 // hashes in its content security policy.  `page` and `trials` are the data of its plots.
 std::string framed_page(const PageFrame& frame, const Json& page, const Json& trials);
 
-// A key to the marks of the plots: `items` are <li> elements.
-std::string plot_key(std::string_view items);
-std::string measured_key();
-// Of the two models, by what the page calls them.
-std::string model_keys(std::string_view tuned, std::string_view final_);
-
 // Without scripts the plots have nothing to show; everything else is text.
 extern const char* const kNoScript;
 
-// The sections that only hold plots of trials.
+// Where the page's scripts draw: controls, and beneath them one plot or a grid of them.
+std::string plot_area(std::string_view name);
+std::string plot_grid(std::string_view name);
+
+// What a page calls the two models of its trials.
+struct ModelNames {
+  std::string_view tuned, final_;
+};
+
+// The sections that only hold plots of trials.  Texts are HTML.
 std::string floor_section();
-std::string drives_section(std::string_view tuned, std::string_view final_);
+std::string drives_section(const ModelNames& models);
+std::string poses_section(std::string_view heading, std::string_view text,
+                          const ModelNames& models);
+// The end of a section.
+std::string residual_plots(std::string_view heading, std::string_view text,
+                           const ModelNames& models);
 // Any trial, played; of pages that a server shows.  `what`: "drive", "push" or "window".
 std::string watch_section(std::string_view what);
 

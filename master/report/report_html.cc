@@ -26,15 +26,7 @@ std::string or_else(const std::string& label, const char* driven) {
   return label.empty() ? driven : html_escaped(label);
 }
 
-std::string poses_section(const Diagnosis& diagnosis) {
-  return R"(<section id="poses"><h2>Measured against predicted end poses</h2>
-<p>)" + or_else(diagnosis.labels.ends, kDrivenEnds) +
-         "</p>" +
-         plot_key(measured_key() + model_keys("tuned base model", "final model, with effects")) +
-         R"(<div class="controls" id="pose-controls"></div>
-<div class="grid" id="pose-plots"></div>)" +
-         kNoScript + "</section>\n";
-}
+constexpr ModelNames kModels = {"tuned base model", "final model, with effects"};
 
 std::string residuals_section(const Diagnosis& diagnosis) {
   std::string html = R"(<section id="residuals"><h2>Where the )" + term("tuned", "tuned model") +
@@ -44,14 +36,8 @@ std::string residuals_section(const Diagnosis& diagnosis) {
   } else {
     html += where_table(diagnosis.where, "Where the tuned model goes wrong", "where");
   }
-  return html + R"(<h3 id="residual-title">)" + term("residual", "Residuals") +
-         R"( against what may drive them</h3>
-<p>)" + or_else(diagnosis.labels.residuals, kDrivenResiduals) +
-         R"( Lines join the means of neighbouring trials, with 90 % intervals.</p>)" +
-         plot_key(model_keys("tuned base model", "final model, with effects")) +
-         R"(<div class="controls" id="residual-controls"></div>
-<div class="grid" id="residual-plots"></div>)" +
-         kNoScript + "</section>\n";
+  return html + residual_plots(term("residual", "Residuals") + " against what may drive them",
+                               or_else(diagnosis.labels.residuals, kDrivenResiduals), kModels);
 }
 
 std::string unexplained_section(const Diagnosis& diagnosis) {
@@ -69,9 +55,7 @@ std::string shape_section(const Diagnosis& diagnosis) {
   std::string html = R"(<section id="shape"><h2>The shape of what nothing explains</h2>)";
   if (diagnosis.residual) html += "<p>" + html_escaped(diagnosis.residual->text) + "</p>";
   if (diagnosis.residual && !diagnosis.residual->correction.field.empty()) {
-    html +=
-        R"(<div class="controls" id="shape-controls"></div><div class="grid" id="shape-plots"></div>)";
-    html += kNoScript;
+    html += plot_grid("shape");
   }
   if (diagnosis.residual && diagnosis.residual->correction.outliers) {
     html += R"(<div class="grid" id="stray-plots"></div>)";
@@ -283,38 +267,30 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
                  cautions_section(diagnosis) + provenance_section(diagnosis);
     return framed_page(frame, page, trials);
   }
-  frame.places = {{"gap", "Gap"},
-                  {"parameters", "Parameters"},
-                  {"poses", "Poses"},
-                  {"residuals", "Residuals"},
-                  {"screening", "Catalogue"},
-                  {"shrinkage", "Shrinkage"},
-                  {"next", "Next"},
-                  {"provenance", "Inputs"},
-                  {"words", "Words"}};
-  if (driven) {
-    frame.places.insert(frame.places.begin() + 2, {{"floor", "Floor"}, {"drives", "Drives"}});
-  }
-  std::string& body = frame.body;
-  body = summary_section(diagnosis) + sanity_section(diagnosis);
-  body += R"(<section id="gap"><h2>The )" + term("gap", "gap") + ", split by cause</h2>" +
-          gap_split_html(diagnosis) + "</section>\n";
-  body +=
+  frame.body = summary_section(diagnosis) + sanity_section(diagnosis);
+  frame.add("gap", "Gap",
+            R"(<section id="gap"><h2>The )" + term("gap", "gap") + ", split by cause</h2>" +
+                gap_split_html(diagnosis) + "</section>\n");
+  frame.add(
+      "parameters", "Parameters",
       parameters_section(diagnosis.parameters, diagnosis.correlations,
-                         {{"tuned", "tuned"}, {"final", "final"}, {"interval", "90 % interval"}});
-  if (driven) body += floor_section() + drives_section("tuned model", "final model");
-  body += poses_section(diagnosis);
-  body += residuals_section(diagnosis);
-  body += screening_section(diagnosis);
-  body += shrinkage_section(diagnosis);
-  body += unexplained_section(diagnosis);
-  const std::string shape = shape_section(diagnosis);
-  if (!shape.empty()) frame.places.insert(frame.places.end() - 3, {"shape", "Shape"});
-  body += shape;
-  body += next_section(diagnosis);
-  body += cautions_section(diagnosis);
-  body += provenance_section(diagnosis);
-  body += glossary_section(diagnosis_terms());
+                         {{"tuned", "tuned"}, {"final", "final"}, {"interval", "90 % interval"}}));
+  if (driven) {
+    frame.add("floor", "Floor", floor_section());
+    frame.add("drives", "Drives", drives_section({"tuned model", "final model"}));
+  }
+  frame.add("poses", "Poses",
+            poses_section("Measured against predicted end poses",
+                          or_else(diagnosis.labels.ends, kDrivenEnds), kModels));
+  frame.add("residuals", "Residuals", residuals_section(diagnosis));
+  frame.add("screening", "Catalogue", screening_section(diagnosis));
+  frame.add("shrinkage", "Shrinkage", shrinkage_section(diagnosis));
+  frame.body += unexplained_section(diagnosis);
+  frame.add("shape", "Shape", shape_section(diagnosis));
+  frame.add("next", "Next", next_section(diagnosis));
+  frame.body += cautions_section(diagnosis);
+  frame.add("provenance", "Inputs", provenance_section(diagnosis));
+  frame.add("words", "Words", glossary_section(diagnosis_terms()));
   return framed_page(frame, page, trials);
 }
 

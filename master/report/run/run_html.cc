@@ -39,8 +39,7 @@ std::string front_section(const RunReport& report) {
              R"(<section id="front"><h2>What is traded off</h2><p id="front-words" data-live>{} members of the last generation are beaten by no other in all objectives. The best of the run is their knee, where giving up a little of one gains least of another: genome {}. <code>gapfarm replay {} --genome ID --out model.toml</code> takes another.</p>)",
              report.front.members.size(), report.front.members[report.front.knee].birth_id,
              html_escaped(report.name)) +
-         R"(<div class="controls" id="front-controls"></div><div class="grid" id="front-plots"></div>)" +
-         kNoScript + "</section>\n";
+         plot_grid("front") + "</section>\n";
 }
 
 std::string understanding_section(const RunReport& report) {
@@ -58,8 +57,7 @@ std::string understanding_section(const RunReport& report) {
       row.cells.push_back(fmt::format("{:.0f}", 100 * share));
   }
   return html + html_table("parts", "importance", "Importance of the parameters", columns, rows) +
-         R"(</div><div class="controls" id="contour-controls"></div><div id="contour-plot"></div>)" +
-         kNoScript + "</section>\n";
+         "</div>" + plot_area("contour") + "</section>\n";
 }
 
 Json front_json(const RunReport& report) {
@@ -202,24 +200,26 @@ std::string progress(const RunReport& report) {
   if (report.generations.empty()) {
     return R"(<section id="progress"><h2>Fitness</h2><p>No generation was completed yet.</p></section>)";
   }
-  return R"(<section id="progress"><h2>Fitness by )" + term("generation", "generation") +
-         R"(</h2><div class="controls" id="progress-controls"></div><div id="progress-plot"></div>)" +
-         kNoScript + "</section>\n";
+  return R"(<section id="progress"><h2>Fitness by )" + term("generation", "generation") + "</h2>" +
+         plot_area("progress") + "</section>\n";
 }
 
-std::string pose_sections() {
-  return R"(<section id="poses"><h2>Measured against simulated end poses</h2>
-<p>One picture a command, seen from where each trial began; turns on the spot by their headings, a row a condition. An ellipse or a bar should hold nine trials in ten.</p>)" +
-         plot_key(measured_key() + model_keys("before", "after")) +
-         R"(<div class="controls" id="pose-controls"></div><div class="grid" id="pose-plots"></div>)" +
-         kNoScript + R"(</section>
-<section id="residuals"><h2>)" +
-         term("residual", "Residuals") +
-         R"(</h2><h3 id="residual-title">Against what may drive them</h3>
-<p>Measured minus predicted, along the axes of the predicted end pose. Lines join the means of neighbouring trials, with 90 % intervals.</p>)" +
-         plot_key(model_keys("before", "after")) +
-         R"(<div class="controls" id="residual-controls"></div><div class="grid" id="residual-plots"></div>)" +
-         kNoScript + "</section>\n";
+constexpr ModelNames kModelsOfRun = {"before", "after"};
+
+void add_pose_sections(PageFrame* frame) {
+  frame->add(
+      "poses", "Poses",
+      poses_section(
+          "Measured against simulated end poses",
+          "One picture a command, seen from where each trial began; turns on the spot by their "
+          "headings, a row a condition. An ellipse or a bar should hold nine trials in ten.",
+          kModelsOfRun));
+  frame->add(
+      "residuals", "Residuals",
+      R"(<section id="residuals"><h2>)" + term("residual", "Residuals") + "</h2>" +
+          residual_plots("Against what may drive them",
+                         "Measured minus predicted, along the axes of the predicted end pose.",
+                         kModelsOfRun));
 }
 
 Json page_json(const RunReport& report) {
@@ -295,41 +295,35 @@ std::string run_html(const RunReport& report) {
   frame.title = "gapfarm run " + report.name;
   frame.brand = "run";
   frame.served = report.served;
-  frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}};
-  if (!report.front.members.empty()) frame.places.emplace_back("front", "Front");
-  if (!report.densities.empty()) frame.places.emplace_back("genes", "Genes");
-  if (!report.elite.lines.empty()) frame.places.emplace_back("elite", "Elite");
-  if (report.sample.evaluated.size() > 1) frame.places.emplace_back("understanding", "Why");
-  if (!report.objective) frame.places.emplace_back("scores", "Held out");
+  frame.body = summary(report);
+  frame.add("progress", "Fitness", progress(report));
+  frame.body += operators_section(report);
+  frame.add("parameters", "Parameters",
+            parameters_section(
+                report.parameters, {},
+                {{"before", "before"}, {"after", "after"}, {"population", "last generation"}}));
+  frame.add("front", "Front", front_section(report));
+  frame.add("genes", "Genes", densities_section(report));
+  frame.add("elite", "Elite", elite_section(report));
+  frame.add("understanding", "Why", understanding_section(report));
+  frame.add("scores", "Held out", scores(report));
   if (driven) {
-    frame.places.emplace_back("floor", "Floor");
-    frame.places.emplace_back("drives", "Drives");
+    frame.add("floor", "Floor", floor_section());
+    frame.add("drives", "Drives", drives_section(kModelsOfRun));
   }
-  if (poses) {
-    frame.places.emplace_back("poses", "Poses");
-    frame.places.emplace_back("residuals", "Residuals");
+  if (poses) add_pose_sections(&frame);
+  if (report.served && !report.genomes.empty() && !report.objective) {
+    frame.add("watch", "Watch",
+              watch_section(report.windows  ? "window"
+                            : report.pieces ? "push"
+                                            : "drive"));
   }
-  const bool farmed = !report.farm.state.empty();
-  const bool watched = report.served && !report.genomes.empty() && !report.objective;
-  if (watched) frame.places.emplace_back("watch", "Watch");
-  if (!report.genomes.empty()) frame.places.emplace_back("genomes", "Genomes");
-  if (farmed) frame.places.emplace_back("farm", "Farm");
-  frame.places.emplace_back("provenance", "Inputs");
-  frame.places.emplace_back("words", "Words");
-  std::string& body = frame.body;
-  body = summary(report) + progress(report) + operators_section(report) +
-         parameters_section(
-             report.parameters, {},
-             {{"before", "before"}, {"after", "after"}, {"population", "last generation"}}) +
-         front_section(report) + densities_section(report) + elite_section(report) +
-         understanding_section(report) + scores(report);
-  if (driven) body += floor_section() + drives_section("before", "after");
-  if (poses) body += pose_sections();
-  if (watched) body += watch_section(report.windows ? "window" : report.pieces ? "push" : "drive");
-  body += genomes_section(report);
-  if (farmed) body += farm_section(report.farm);
-  body += R"(<section id="provenance"><h2>What went in</h2>)" +
-          html_definitions(report.provenance) + "</section>\n" + glossary_section(run_terms());
+  frame.add("genomes", "Genomes", genomes_section(report));
+  frame.add("farm", "Farm", farm_section(report.farm));
+  frame.add("provenance", "Inputs",
+            R"(<section id="provenance"><h2>What went in</h2>)" +
+                html_definitions(report.provenance) + "</section>\n");
+  frame.add("words", "Words", glossary_section(run_terms()));
   Diagnosis table;
   if (report.outcome) table.trials = report.outcome->trials;
   return framed_page(frame, page_json(report), trials_json(table, kRunPlotDigits));

@@ -256,6 +256,7 @@ Json densities_json(const RunReport& report) {
 }
 
 std::string farm_section(const RunFarm& farm) {
+  if (farm.state.empty()) return "";
   std::string html = R"(<section id="farm"><h2>Farm</h2><div id="farm-now" data-live>)" +
                      worker_table(farm) + "</div>" + timeline_html(farm.timeline) +
                      R"(<div id="farm-past" data-live><h3>Workers that failed</h3>)";
