@@ -46,15 +46,16 @@ const DRIVE_LINES = [
   { key: "measured", width: 2.4 },
 ];
 
-function driveLines(drive) {
-  const { trial } = drive;
-  return DRIVE_LINES.map((line) => {
-    const known = drive[line.key]?.length > 1;
-    const end = poseOf(trial, line.key);
-    const path = unwrapped(known ? drive[line.key] : arcTo(end, trial.duration_s));
-    return { ...line, known, path, end, turned: path.at(-1)[3] };
-  });
+// A path as it was kept, or in its place the arc to its end.
+function pathOrArc(path, end, duration) {
+  const known = path?.length > 1;
+  return { known, path: unwrapped(known ? path : arcTo(end, duration)) };
 }
+
+const driveLines = (drive) => DRIVE_LINES.map((line) => {
+  const end = poseOf(drive.trial, line.key);
+  return { ...line, end, ...pathOrArc(drive[line.key], end, drive.trial.duration_s) };
+});
 
 const tick = ({ x, y, theta }, length) => [1000 * x, 1000 * y, 1000 * x + length * Math.cos(theta), 1000 * y + length * Math.sin(theta)];
 
@@ -79,9 +80,9 @@ function wayLayers(drive, lines) {
 
 function headingLayers(drive, lines) {
   const layers = [];
-  for (const { key, path, known, dashed, width, turned: whole } of lines) {
+  for (const { key, path, known, dashed, width } of lines) {
     layers.push({ kind: "line", style: key, points: path.map(([t, , , theta]) => [t, degrees(theta)]), dashed: dashed || !known, width, faint: known ? 0.95 : 0.45, name: `${key} heading` });
-    const at = path.at(-1)[0];
+    const [at, , , whole] = path.at(-1);
     if (key !== "measured") {
       const half = degrees(1.645 * Math.sqrt(Math.max(drive.trial[`${key}_cov_tt`], 0)));
       layers.push({ kind: "line", style: key, points: [[at, degrees(whole) - half], [at, degrees(whole) + half]], width: 3 });

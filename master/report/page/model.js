@@ -49,10 +49,7 @@ if (PICTURES) {
     { key, label, matches: new RegExp(matches), of: (t) => t[key] })), ...plain);
 }
 
-const covariateOf = (text) => {
-  const lower = text.toLowerCase();
-  return lower ? COVARIATES.find((c) => c.matches.test(lower)) : undefined;
-};
+const covariateOf = (text) => (text ? COVARIATES.find((c) => c.matches.test(text.toLowerCase())) : undefined);
 
 const mean = (list) => list.reduce((sum, v) => sum + v, 0) / list.length;
 

@@ -90,6 +90,7 @@ function fitted(spec, width, height) {
 
 const within = ({ x, y }, [px, py]) => px >= x.min && px <= x.max && py >= y.min && py <= y.max;
 
+const distinct = (numbers) => [...new Set(numbers)].sort((a, b) => a - b);
 const extent = (values) => [Math.min(...values), Math.max(...values)];
 const spaced = ({ min, max }, steps) => Array.from({ length: steps + 1 }, (_, i) => min + (i / steps) * (max - min));
 

@@ -26,8 +26,6 @@ function shiftAt(term, weights, z) {
   return sum;
 }
 
-const distinct = (values) => [...new Set(values)].sort((a, b) => a - b);
-
 // From the least centre to the greatest; a whole turn of what comes back to itself.
 function reachOf(term, j) {
   if (SHAPE_CYCLIC.has(term.covariates[j])) return { min: -Math.PI, max: Math.PI };

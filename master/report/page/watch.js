@@ -19,10 +19,8 @@ const WATCHED = [
 // An end alone becomes an arc, which is drawn faintly.
 function watchedPaths(drive) {
   return WATCHED.filter(({ key }) => drive[key]?.length).map((line) => {
-    const path = drive[line.key];
-    const known = path.length > 1;
-    const [, x, y, theta] = path[0];
-    return { ...line, known, path: unwrapped(known ? path : arcTo({ x, y, theta }, drive.duration_s)) };
+    const [, x, y, theta] = drive[line.key].at(-1);
+    return { ...line, ...pathOrArc(drive[line.key], { x, y, theta }, drive.duration_s) };
   });
 }
 
