@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 
 namespace gapfarm {
 namespace {
@@ -62,7 +63,7 @@ std::string script_safe(std::string_view json) { return escaped(json, kInScript)
 std::string number_text(double value, int digits) {
   if (!std::isfinite(value)) return kDash;
   double size = std::abs(value);
-  if (size < 1000) size = std::strtod(fmt::format("{:.{}e}", size, digits - 1).c_str(), nullptr);
+  if (size < 1000) size = as_written(size, digits);
   std::string text = "0";
   if (size >= 1000 && size < 1e15) {
     text = fmt::format("{:.0f}", size);
@@ -79,6 +80,15 @@ std::string number_text(double value, int digits) {
     }
   }
   return (value < 0 && text != "0" ? kMinus : "") + text;
+}
+
+double as_written(double value, int digits) {
+  return std::strtod(fmt::format("{:.{}g}", value, digits).c_str(), nullptr);
+}
+
+std::string with_unit(std::string text, std::string_view unit, std::string_view between) {
+  if (!unit.empty() && unit != "-") text.append(between).append(unit);
+  return text;
 }
 
 std::string percent_text(double share) {
@@ -119,6 +129,21 @@ std::string html_table(std::string_view css, std::string_view file, std::string_
   return html + "</tbody></table>";
 }
 
+std::string html_names(const std::vector<std::string>& names, std::string_view between) {
+  return joined(names, between,
+                [](const std::string& name) { return "<code>" + html_escaped(name) + "</code>"; });
+}
+
+std::string html_list(const std::vector<std::string>& lines, std::string_view css) {
+  std::string html = css.empty() ? "<ul>" : fmt::format(R"(<ul class="{}">)", css);
+  for (const std::string& line : lines) html += "<li>" + html_escaped(line) + "</li>";
+  return html + "</ul>";
+}
+
+std::string html_section(std::string_view id, std::string_view heading, std::string_view content) {
+  return fmt::format("<section id=\"{}\"><h2>{}</h2>{}</section>\n", id, heading, content);
+}
+
 std::string html_definitions(const std::vector<std::pair<std::string, std::string>>& rows) {
   std::string html = R"(<dl class="provenance">)";
   for (const auto& [label, value] : rows) {
@@ -144,6 +169,16 @@ std::string bar_svg(double share, std::string_view css_class) {
       R"(<svg class="bar" aria-hidden="true"><rect class="track" width="100%" height="100%"/>)"
       R"(<rect class="{}" width="{:.2f}%" height="100%"/></svg>)",
       css_class, clamped_percent(share));
+}
+
+std::string html_tile(std::string_view title, const std::string& before, std::string_view after,
+                      std::string_view unit, std::string_view small) {
+  return fmt::format(
+      R"(<div class="tile"><dt>{}</dt><dd>{}<strong>{}</strong> {}{}</dd></div>)", title,
+      before.empty()
+          ? ""
+          : R"(<span class="from">)" + before + R"(</span> <span aria-label="to">→</span> )",
+      after, unit, small);
 }
 
 std::string interval_svg(double value, double lo, double hi) {

@@ -20,6 +20,13 @@ inline constexpr int kPlotDigits = 7;
 // "0.412", "1,230", "−3.2": about three significant digits; "–" when not finite.
 std::string number_text(double value, int digits = 3);
 
+// The number that `value` is when it is written with so many significant digits: its text in a
+// page's data is no longer.
+double as_written(double value, int digits);
+
+// "0.28 m/s"; the text alone where there is no unit ("" or "-").
+std::string with_unit(std::string text, std::string_view unit, std::string_view between = " ");
+
 // "88 %"; "–" when not finite.
 std::string percent_text(double share);
 
@@ -45,6 +52,13 @@ struct HtmlRow {
 std::string html_table(std::string_view css, std::string_view file, std::string_view caption,
                        const std::vector<HtmlColumn>& columns, const std::vector<HtmlRow>& rows);
 
+// Names, as code; a list of sentences.  Both of text.
+std::string html_names(const std::vector<std::string>& names, std::string_view between = ", ");
+std::string html_list(const std::vector<std::string>& lines, std::string_view css = "");
+
+// `heading` and `content` are HTML.
+std::string html_section(std::string_view id, std::string_view heading, std::string_view content);
+
 // A list of labels with their values, both text.
 std::string html_definitions(const std::vector<std::pair<std::string, std::string>>& rows);
 
@@ -53,6 +67,10 @@ std::string csp_hash(std::string_view content);
 
 // A bar of `share` of the width, [0, 1], hidden from screen readers: the number stands beside it.
 std::string bar_svg(double share, std::string_view css_class);
+
+// One of the few figures that matter, before the change and after; HTML.  `before`: empty without.
+std::string html_tile(std::string_view title, const std::string& before, std::string_view after,
+                      std::string_view unit, std::string_view small = "");
 
 // An interval on the scale from 0 to 1, with its estimate.
 std::string interval_svg(double value, double lo, double hi);

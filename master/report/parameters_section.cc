@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 
@@ -11,8 +12,7 @@ namespace gapfarm {
 namespace {
 
 std::string value_with_unit(double value, const std::string& unit) {
-  const std::string text = number_text(value, 4);
-  return unit.empty() || unit == "-" ? text : text + " " + html_escaped(unit);
+  return html_escaped(with_unit(number_text(value, 4), unit));
 }
 
 // Between its bounds: where the value lies, with its interval.
@@ -53,13 +53,12 @@ HtmlColumn number_column(const TermColumn& column) {
 }
 
 std::string warnings(const std::vector<ParameterRow>& rows) {
-  std::string keys;
+  std::vector<std::string> keys;
   for (const ParameterRow& row : rows) {
-    if (bound_hit(row) == BoundHit::kNone) continue;
-    keys += (keys.empty() ? "<code>" : ", <code>") + html_escaped(row.key) + "</code>";
+    if (bound_hit(row) != BoundHit::kNone) keys.push_back(row.key);
   }
   if (keys.empty()) return "";
-  return "<p class=\"caution-box\">▲ At a bound: " + keys +
+  return "<p class=\"caution-box\">▲ At a bound: " + html_names(keys) +
          ". The search wanted to go on: widen the range where it makes sense, and trust the rest "
          "of the page less until it does not.</p>";
 }
@@ -114,15 +113,10 @@ std::string config_snippet(const std::vector<ParameterRow>& rows, bool intervals
 
 std::string parameters_section(const std::vector<ParameterRow>& rows,
                                const std::vector<ParameterCorrelation>& correlations,
-                               const ParameterColumns& columns) {
-  std::string html = R"(<section id="parameters"><h2>Parameters</h2>)";
-  if (rows.empty()) {
-    return html +
-           "<p>None were kept with this file: make it again with this program.</p></section>\n";
-  }
+                               const ParameterColumns& columns, std::string_view none) {
+  std::string html = R"(<section id="parameters" data-live><h2>Parameters</h2>)";
+  if (rows.empty()) return html + fmt::format("<p>{}</p></section>\n", none);
   html += warnings(rows);
-  std::vector<HtmlRow> lines;
-  for (const ParameterRow& row : rows) lines.push_back(parameter_row(row));
   html += html_table("cards parameters", "parameters", "Parameters",
                      {{"parameter"},
                       number_column(columns.before),
@@ -130,7 +124,7 @@ std::string parameters_section(const std::vector<ParameterRow>& rows,
                       number_column(columns.interval),
                       {term("bound", "searched between"), "between", "searched between"},
                       {"remarks"}},
-                     lines);
+                     mapped(rows, parameter_row));
   html += correlations_html(correlations);
   return html +
          R"(<h3>For your config</h3><p>Paste it in place of the same keys; )"

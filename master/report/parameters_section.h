@@ -19,9 +19,10 @@ struct ParameterColumns {
 
 // The section of the page: values with units, intervals, where they lie between their bounds with a
 // warning at one, what makes up for what, and config_snippet() with a button that copies it.
+// `none`: why there are no rows, where there are none.
 std::string parameters_section(const std::vector<ParameterRow>& rows,
                                const std::vector<ParameterCorrelation>& correlations,
-                               const ParameterColumns& columns);
+                               const ParameterColumns& columns, std::string_view none);
 
 // [parameters] and [effects.NAME] as a config takes them (docs/configuration.md).  `intervals`: the
 // rows' lo and hi are intervals of the values and stand beside them; else the rows' notes do.

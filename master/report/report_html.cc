@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
@@ -41,34 +42,29 @@ std::string residuals_section(const Diagnosis& diagnosis) {
 }
 
 std::string unexplained_section(const Diagnosis& diagnosis) {
-  std::string html = R"(<section id="unexplained"><h2>What stays unexplained</h2>)";
-  if (diagnosis.unexplained.empty()) {
-    return html +
-           "<p>The final model's residuals depend on nothing that was looked at.</p></section>\n";
-  }
-  return html + where_table(diagnosis.unexplained, "What stays unexplained", "unexplained") +
-         "</section>\n";
+  constexpr const char* kHeading = "What stays unexplained";
+  return html_section(
+      "unexplained", kHeading,
+      diagnosis.unexplained.empty()
+          ? "<p>The final model's residuals depend on nothing that was looked at.</p>"
+          : where_table(diagnosis.unexplained, kHeading, "unexplained"));
 }
 
 std::string shape_section(const Diagnosis& diagnosis) {
   if (!diagnosis.residual && diagnosis.nearest.empty()) return "";
-  std::string html = R"(<section id="shape"><h2>The shape of what nothing explains</h2>)";
+  std::string html;
   if (diagnosis.residual) html += "<p>" + html_escaped(diagnosis.residual->text) + "</p>";
   if (diagnosis.residual && !diagnosis.residual->correction.field.empty()) {
     html += plot_grid("shape");
   }
   if (diagnosis.residual && diagnosis.residual->correction.outliers) {
-    html += R"(<div class="grid" id="stray-plots"></div>)";
-    html += kNoScript;
+    html += R"(<div class="grid" id="stray-plots"></div>)" + std::string(kNoScript);
   }
   if (!diagnosis.nearest.empty()) {
-    html += "<h3>What comes nearest, and why it is not the cause</h3><ul>";
-    for (const NearMiss& miss : diagnosis.nearest) {
-      html += "<li>" + html_escaped(miss.text) + "</li>";
-    }
-    html += "</ul>";
+    html += "<h3>What comes nearest, and why it is not the cause</h3>" +
+            html_list(mapped(diagnosis.nearest, &NearMiss::text));
   }
-  return html + "</section>\n";
+  return html_section("shape", "The shape of what nothing explains", html);
 }
 
 constexpr std::array<GapUnit, 3> kUnits = {GapUnit::kNats, GapUnit::kMillimetres,
@@ -94,22 +90,22 @@ std::optional<double> level_after(const NamedEffect& effect, GapUnit unit) {
                                          : effect.heading_mrad_after;
 }
 
-// Class and badge of a part; effects count from 1.
+// Hatch and badge of a part; effects count from 1.
 struct Look {
-  std::string css_class;
+  std::string hatch;
   std::string badge;
 };
 
 Look look(const GapPart& part, int effect) {
   switch (part.kind) {
     case GapPart::Kind::kFloor:
-      return {"part-floor", "F"};
+      return {"floor", "F"};
     case GapPart::Kind::kUnexplained:
-      return {"part-unexplained", "?"};
+      return {"unexplained", "?"};
     case GapPart::Kind::kEffect:
       break;
   }
-  return {fmt::format("part-effect-{}", (effect - 1) % kHatchCount + 1), std::to_string(effect)};
+  return {std::to_string((effect - 1) % kHatchCount + 1), std::to_string(effect)};
 }
 
 // A stretch of a bar.
@@ -139,9 +135,8 @@ std::vector<Stretch> stretches(const GapSplit& split, bool before) {
     const Look own = look(part, effect);
     if (!is_effect || before) list.push_back({above_zero(amount), own, part.label});
     if (is_effect && !before) {
-      list.push_back({above_zero(-part.amount),
-                      {"part-worse", "+" + own.badge},
-                      part.label + " made it worse"});
+      list.push_back(
+          {above_zero(-part.amount), {"worse", "+" + own.badge}, part.label + " made it worse"});
     }
   }
   return list;
@@ -162,8 +157,8 @@ std::string stacked_bar(const GapSplit& split, bool before, double scale) {
     const double width = scale > 0 ? 100 * stretch.length / scale : 0;
     if (width <= 0) continue;
     svg += fmt::format(
-        R"(<svg x="{:.3f}%" width="{:.3f}%"><rect class="part {}" width="100%" height="100%"/>)",
-        at, width, stretch.look.css_class);
+        R"svg(<svg x="{:.3f}%" width="{:.3f}%"><rect class="part" fill="url(#hatch-{})" width="100%" height="100%"/>)svg",
+        at, width, stretch.look.hatch);
     // A name is drawn where the bar is certainly wide enough for it, a badge where that fits.
     const double share = width / 100;
     const auto middle = [&](const char* css_class, const std::string& label) {
@@ -194,13 +189,6 @@ std::string bars(const GapSplit& split) {
       stacked_bar(split, false, scale), number_text(split.final_), w.unit);
 }
 
-const GapPart* find_part(const GapSplit& split, const GapPart& like) {
-  for (const GapPart& part : split.parts) {
-    if (part.kind == like.kind && part.label == like.label) return &part;
-  }
-  return nullptr;
-}
-
 // With what a sign other than the usual one means.
 std::string amount_text(const GapPart& part, const GapSplit& split) {
   const std::string text = number_text(part.amount);
@@ -227,12 +215,12 @@ std::string parts_table(const std::vector<GapSplit>& splits) {
     const Look l = look(*part, number);
     rows.push_back(
         {fmt::format(
-             R"(<svg class="swatch" aria-hidden="true"><rect class="part {}" width="100%" height="100%"/>)"
+             R"svg(<svg class="swatch" aria-hidden="true"><rect class="part" fill="url(#hatch-{})" width="100%" height="100%"/>)svg"
              R"(<text class="badge" x="50%" y="50%">{}</text></svg>{})",
-             l.css_class, l.badge, html_escaped(part->label)),
+             l.hatch, l.badge, html_escaped(part->label)),
          {}});
     for (const GapSplit& split : splits) {
-      const GapPart* same = find_part(split, *part);
+      const GapPart* same = find_by(split.parts, part->label, &GapPart::label);
       rows.back().cells.push_back(same ? amount_text(*same, split) : "with the others");
     }
   }
@@ -269,12 +257,13 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
   }
   frame.body = summary_section(diagnosis) + sanity_section(diagnosis);
   frame.add("gap", "Gap",
-            R"(<section id="gap"><h2>The )" + term("gap", "gap") + ", split by cause</h2>" +
-                gap_split_html(diagnosis) + "</section>\n");
+            html_section("gap", "The " + term("gap", "gap") + ", split by cause",
+                         gap_split_html(diagnosis)));
   frame.add(
       "parameters", "Parameters",
       parameters_section(diagnosis.parameters, diagnosis.correlations,
-                         {{"tuned", "tuned"}, {"final", "final"}, {"interval", "90 % interval"}}));
+                         {{"tuned", "tuned"}, {"final", "final"}, {"interval", "90 % interval"}},
+                         "None were kept with this file: make it again with this program."));
   if (driven) {
     frame.add("floor", "Floor", floor_section());
     frame.add("drives", "Drives", drives_section({"tuned model", "final model"}));

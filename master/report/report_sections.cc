@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 
@@ -39,25 +40,12 @@ VerdictLabels verdict_labels(Verdict verdict) {
   return {"", "", "", ""};
 }
 
-std::string names(const std::vector<std::string>& list, const char* separator = ", ") {
-  std::string out;
-  for (const std::string& name : list) {
-    if (!out.empty()) out += separator;
-    out += "<code>" + html_escaped(name) + "</code>";
-  }
-  return out;
-}
-
 std::string tile(const std::string& title, const GapFigures& figures, bool changed,
                  const std::string& unit) {
-  const std::string from =
-      changed ? fmt::format(R"(<span class="from">{}</span> <span aria-label="to">→</span> )",
-                            number_text(figures.tuned))
-              : "";
-  return fmt::format(
-      R"(<div class="tile"><dt>{}</dt><dd>{}<strong>{}</strong> {}<small>{} {}</small></dd></div>)",
-      title, from, number_text(changed ? figures.final_ : figures.tuned), unit,
-      term("floor", "floor"), number_text(figures.floor));
+  return html_tile(
+      title, changed ? number_text(figures.tuned) : "",
+      number_text(changed ? figures.final_ : figures.tuned), unit,
+      "<small>" + term("floor", "floor") + " " + number_text(figures.floor) + "</small>");
 }
 
 // A bar with its number.
@@ -72,17 +60,13 @@ std::string share_text(double share) {
   return meter(share, "fill", percent_text(share));
 }
 
-std::string with_unit(double value, const std::string& unit) {
-  const std::string text = number_text(value);
-  return unit.empty() || unit == "-" ? text : text + " " + html_escaped(unit);
-}
-
 std::string estimates(const NamedEffect& effect) {
   std::string rows;
   for (const Estimate& e : effect.parameters) {
     rows += fmt::format(
         R"(<tr><th scope="row"><code>{}</code></th><td class="number">{}</td><td class="number">{} to {}</td></tr>)",
-        html_escaped(e.key), with_unit(e.value, e.unit), number_text(e.lo), number_text(e.hi));
+        html_escaped(e.key), html_escaped(with_unit(number_text(e.value), e.unit)),
+        number_text(e.lo), number_text(e.hi));
   }
   if (!effect.axis.empty()) {
     rows += fmt::format(
@@ -126,8 +110,8 @@ std::string effect_card(const NamedEffect& effect, std::size_t number) {
       step_text(effect.position_mm_before, effect.position_mm_after, "mm"),
       step_text(effect.heading_mrad_before, effect.heading_mrad_after, "mrad"));
   if (!effect.aliases.empty()) {
-    html +=
-        R"(<div class="wide"><dt>or, just as well on these data</dt><dd>)" + names(effect.aliases);
+    html += R"(<div class="wide"><dt>or, just as well on these data</dt><dd>)" +
+            html_names(effect.aliases);
     if (!effect.alias_reason.empty()) {
       html += "<br><small>" + html_escaped(effect.alias_reason) + "</small>";
     }
@@ -160,13 +144,12 @@ HtmlRow screened_row(const Diagnosis& diagnosis, const Screened& s, double large
   }
   std::string note = html_escaped(s.note);
   if (!s.alias_set.empty()) {
-    note =
-        "<span>looks like " + names(s.alias_set) + (note.empty() ? "" : "<br>") + note + "</span>";
+    note = "<span>looks like " + html_names(s.alias_set) + (note.empty() ? "" : "<br>") + note +
+           "</span>";
   }
-  std::string from;
-  for (const auto& [key, size] : s.detectable_from) {
-    from += (from.empty() ? "" : ", ") + key + " " + number_text(size);
-  }
+  const std::string from = joined(s.detectable_from, ", ", [](const auto& size) {
+    return size.first + " " + number_text(size.second);
+  });
   return {"<code>" + html_escaped(s.effect) + "</code>" + standing(diagnosis, s.effect),
           {meter(largest > 0 ? s.gain / largest : 0, named ? "fill-named" : "fill",
                  number_text(s.gain)),
@@ -194,13 +177,7 @@ std::string summary_section(const Diagnosis& diagnosis) {
                term("nat", "nats/trial")) +
           tile("Position, " + term("rms", "rms"), diagnosis.position_mm, changed, "mm") +
           tile("Heading, " + term("rms", "rms"), diagnosis.heading_mrad, changed, "mrad") + "</dl>";
-  if (!diagnosis.findings.empty()) {
-    html += R"(<ul class="long">)";
-    for (const std::string& sentence : diagnosis.findings) {
-      html += "<li>" + html_escaped(sentence) + "</li>";
-    }
-    html += "</ul>";
-  }
+  if (!diagnosis.findings.empty()) html += html_list(diagnosis.findings, "long");
   if (!diagnosis.cautions.empty()) {
     html += fmt::format(
         R"(<p class="caution-link">▲ <a href="#cautions">{} caution{}</a> to read before relying on this.</p>)",
@@ -211,12 +188,13 @@ std::string summary_section(const Diagnosis& diagnosis) {
 
 std::string sanity_section(const Diagnosis& diagnosis) {
   if (diagnosis.sanity.empty()) return "";
-  std::string html = R"(<section id="sanity"><h2>Data-quality warnings</h2><ul class="cautions">)";
+  std::string items;
   for (const SanityFinding& f : diagnosis.sanity) {
-    html += "<li><p><code>" + html_escaped(f.name) + "</code>: " + html_escaped(f.text) +
-            "</p><p><strong>What to do:</strong> " + html_escaped(f.remedy) + "</p></li>";
+    items += "<li><p><code>" + html_escaped(f.name) + "</code>: " + html_escaped(f.text) +
+             "</p><p><strong>What to do:</strong> " + html_escaped(f.remedy) + "</p></li>";
   }
-  return html + "</ul></section>\n";
+  return html_section("sanity", "Data-quality warnings",
+                      R"(<ul class="cautions">)" + items + "</ul>");
 }
 
 std::string where_table(const std::vector<Where>& findings, const char* caption, const char* file) {
@@ -256,46 +234,48 @@ std::string screening_section(const Diagnosis& diagnosis) {
   std::ranges::stable_sort(order, [&](const auto* a, const auto* b) { return key(a) > key(b); });
   std::vector<HtmlRow> rows;
   for (const Screened* s : order) rows.push_back(screened_row(diagnosis, *s, largest));
-  return R"(<section id="screening"><h2>Which effect: the whole catalogue</h2><p>What each effect could add to the )"
-         R"(tuned model once everything that retuning absorbs is taken out. The p-value is against that effect's own luck )"
-         R"(on data with nothing to find. Effects that look alike leave parallel traces in these data. From the sizes in the last but )"
-         R"(one column on, each alone, this log would name an effect with 95 % power, by slopes at the fit.</p>)" +
-         html_table("cards screening", "catalogue", "Screening of the catalogue",
-                    {{"effect"},
-                     {term("gain", "gain, nats in all"), "number with-bar", "gain, nats"},
-                     {"p", "number"},
-                     {term("held-out", "held out") + ", " + term("nat", "nats a trial"), "number",
-                      "held out, nats a trial"},
-                     {"best strength"},
-                     {"would be named from"},
-                     {"remarks"}},
-                    rows) +
-         "</section>";
+  return html_section(
+      "screening", "Which effect: the whole catalogue",
+      R"(<p>What each effect could add to the )"
+      R"(tuned model once everything that retuning absorbs is taken out. The p-value is against that effect's own luck )"
+      R"(on data with nothing to find. Effects that look alike leave parallel traces in these data. From the sizes in the last but )"
+      R"(one column on, each alone, this log would name an effect with 95 % power, by slopes at the fit.</p>)" +
+          html_table("cards screening", "catalogue", "Screening of the catalogue",
+                     {{"effect"},
+                      {term("gain", "gain, nats in all"), "number with-bar", "gain, nats"},
+                      {"p", "number"},
+                      {term("held-out", "held out") + ", " + term("nat", "nats a trial"), "number",
+                       "held out, nats a trial"},
+                      {"best strength"},
+                      {"would be named from"},
+                      {"remarks"}},
+                     rows));
 }
 
 std::string shrinkage_section(const Diagnosis& diagnosis) {
-  std::string html = R"(<section id="shrinkage"><h2>How far the gap shrinks</h2>)";
+  constexpr const char* kHeading = "How far the gap shrinks";
   if (diagnosis.effects.empty()) {
-    return html + "<p>No effect was added, so nothing shrinks.</p></section>";
+    return html_section("shrinkage", kHeading, "<p>No effect was added, so nothing shrinks.</p>");
   }
-  html +=
+  std::string html =
       R"(<p>On trials that the fit did not see; the interval is from resampling sessions or blocks of trials.</p><div class="effects">)";
   for (std::size_t i = 0; i < diagnosis.effects.size(); ++i) {
     html += effect_card(diagnosis.effects[i], i + 1);
   }
-  return html + "</div></section>";
+  return html_section("shrinkage", kHeading, html + "</div>");
 }
 
 std::string next_section(const Diagnosis& diagnosis) {
-  std::string html = R"(<section id="next"><h2>What to try next</h2>)";
-  if (diagnosis.next.empty()) return html + "<p>Nothing in particular.</p></section>";
-  html += R"(<ol class="next">)";
+  if (diagnosis.next.empty()) {
+    return html_section("next", "What to try next", "<p>Nothing in particular.</p>");
+  }
+  std::string html = R"(<ol class="next">)";
   for (const NextExperiment& n : diagnosis.next) {
     html += "<li><p>" + html_escaped(n.text) + "</p>";
     if (!n.separates.empty()) {
       html += "<p class=\"detail\">" +
-              (n.separates.size() > 1 ? "separates " + names(n.separates, " from ")
-                                      : "shows " + names(n.separates)) +
+              (n.separates.size() > 1 ? "separates " + html_names(n.separates, " from ")
+                                      : "shows " + html_names(n.separates)) +
               "</p>";
     }
     if (n.trials > 0) {
@@ -305,21 +285,17 @@ std::string next_section(const Diagnosis& diagnosis) {
     }
     html += "</li>";
   }
-  return html + "</ol></section>";
+  return html_section("next", "What to try next", html + "</ol>");
 }
 
 std::string cautions_section(const Diagnosis& diagnosis) {
   if (diagnosis.cautions.empty()) return "";
-  std::string html = R"(<section id="cautions"><h2>Cautions</h2><ul class="cautions">)";
-  for (const std::string& caution : diagnosis.cautions) {
-    html += "<li>" + html_escaped(caution) + "</li>";
-  }
-  return html + "</ul></section>";
+  return html_section("cautions", "Cautions", html_list(diagnosis.cautions, "cautions"));
 }
 
 std::string provenance_section(const Diagnosis& diagnosis) {
-  std::string html = R"(<section id="provenance"><h2>What went in</h2>)";
-  if (!diagnosis.provenance.empty()) html += html_definitions(diagnosis.provenance);
+  std::string html;
+  if (!diagnosis.provenance.empty()) html = html_definitions(diagnosis.provenance);
   double total = 0;
   for (const auto& [stage, seconds] : diagnosis.timing_s) {
     if (std::isfinite(seconds)) total += seconds;
@@ -337,7 +313,7 @@ std::string provenance_section(const Diagnosis& diagnosis) {
         R"(<tr class="sum"><th scope="row">in all</th><td></td><td class="number">{}</td></tr></tbody></table>)",
         number_text(total));
   }
-  return html + "</section>";
+  return html_section("provenance", "What went in", html);
 }
 
 }  // namespace gapfarm

@@ -116,32 +116,25 @@ Status add_densities(const RunReader& reader, const Problem& problem,
   return {};
 }
 
-RunGenome genome_of_member(const RunReader::Member& member) {
-  const StoredIndividual& one = member.individual;
-  return {one.birth_id,  member.generation, one.fitness, one.outcome,
-          one.operators, one.parents,       {}};
-}
-
 Status add_genomes(const RunReader& reader, std::uint64_t generation, RunReport* report) {
   ASSIGN_OR_RETURN(const auto members, reader.individuals(generation));
   report->genomes_of = generation;
   for (const StoredIndividual& one : members) {
     if (report->genomes.size() == kMostGenomes) break;
-    report->genomes.push_back(genome_of_member({generation, one}));
+    report->genomes.push_back({generation, one});
   }
   return {};
 }
 
 Status look_up(const RunReader& reader, const Problem& problem, std::uint64_t birth_id,
                RunReport* report) {
-  ASSIGN_OR_RETURN(const auto member, reader.member(birth_id));
-  if (!member) {
+  ASSIGN_OR_RETURN(report->looked_up, reader.member(birth_id));
+  if (!report->looked_up) {
     report->without_looked_up =
         fmt::format("No member of a committed generation is genome {}.", birth_id);
     return {};
   }
-  report->looked_up = genome_of_member(*member);
-  const std::vector<double>& genome = member->individual.genome;
+  const std::vector<double>& genome = report->looked_up->individual.genome;
   if (genome.size() != problem.genes.size()) return {};
   for (std::size_t g = 0; g < genome.size(); ++g) {
     const Parameter& p = problem.table()[problem.genes[g].row];
@@ -149,7 +142,7 @@ Status look_up(const RunReader& reader, const Problem& problem, std::uint64_t bi
         decode_gene(problem.table(), problem.genes[g], std::clamp(genome[g], 0.0, 1.0));
     const std::string text =
         p.choices.empty() ? number_text(v, 6) : p.choices[static_cast<std::size_t>(v)];
-    report->looked_up->values.emplace_back(p.key, text + (p.unit == "-" ? "" : " " + p.unit));
+    report->looked_up_values.emplace_back(p.key, with_unit(text, p.unit));
   }
   return {};
 }
@@ -349,10 +342,7 @@ Status add_farm(const RunReader& reader, RunReport* report) {
     farm.incidents.push_back(fmt::format("{}, generation {}, {}: {}", day_and_time(it->unix_s),
                                          it->generation, incident_name(it->kind), it->text));
   }
-  ASSIGN_OR_RETURN(const auto lost, reader.given_up(kMostGivenUp));
-  for (const RunReader::Member& member : lost) {
-    farm.given_up.push_back(genome_of_member(member));
-  }
+  ASSIGN_OR_RETURN(farm.given_up, reader.given_up(kMostGivenUp));
   farm.log = log_tail(reader.run());
   return {};
 }

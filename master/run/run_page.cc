@@ -95,9 +95,8 @@ void add_determined(const std::filesystem::path& file, std::vector<ParameterRow>
       row->note = "gapfarm determine was asked about another value of it";
       continue;
     }
-    const std::string unit = row->unit == "-" ? "" : " " + row->unit;
-    row->note = fmt::format("95 % by gapfarm determine: {} to {}{}{}", number_text(number(2), 4),
-                            number_text(number(3), 4), unit,
+    row->note = fmt::format("95 % by gapfarm determine: {} to {}{}", number_text(number(2), 4),
+                            with_unit(number_text(number(3), 4), row->unit),
                             cells[5] == "1" ? "" : "; the data do not determine it");
   }
 }
@@ -124,9 +123,10 @@ std::string program_text(const Problem& problem) {
 std::string headline(const RunReport& report) {
   if (report.generations.empty()) return "No generation was completed yet.";
   const RunGeneration& last = report.generations.back();
-  const std::string best = last.best ? number_text(*last.best, 6) : "none that ended well";
-  return fmt::format("Best {} {}{} after {} generations", report.fitness, best,
-                     report.unit == "-" || !last.best ? "" : " " + report.unit, last.generation);
+  return fmt::format("Best {} {} after {} generations", report.fitness,
+                     last.best ? with_unit(number_text(*last.best, 6), report.unit)
+                               : std::string("none that ended well"),
+                     last.generation);
 }
 
 Result<std::optional<RunOutcome>> stored_outcome(const RunReader& reader, std::uint64_t last,

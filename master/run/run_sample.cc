@@ -35,12 +35,6 @@ std::vector<std::vector<double>> ranks_of(const std::vector<const StoredIndividu
   return columns;
 }
 
-RunSample::Evaluated evaluated(const StoredIndividual& one) {
-  RunSample::Evaluated shown{one.birth_id, *one.fitness, one.genome, {}};
-  for (const auto& [name, value] : one.objectives) shown.objectives.push_back(value);
-  return shown;
-}
-
 // Of an objective over the members that have it.
 std::pair<double, double> limits_of(const std::vector<StoredIndividual>& members, std::size_t m) {
   std::pair limits{std::numeric_limits<double>::infinity(),
@@ -157,7 +151,6 @@ RunSample run_sample(const Problem& problem, const std::vector<StoredIndividual>
                           one.objectives.size() == objectives.size();
     if (complete) whole.push_back(&one);
   }
-  sample.members = whole.size();
   const auto ranks = ranks_of(whole, objectives.size());
   for (std::size_t g = 0; g < problem.genes.size(); ++g) {
     const Gene& gene = problem.genes[g];
@@ -171,9 +164,7 @@ RunSample run_sample(const Problem& problem, const std::vector<StoredIndividual>
     }
   }
   const std::size_t each = whole.size() / kMostEvaluated + 1;
-  for (std::size_t i = 0; i < whole.size(); i += each) {
-    sample.evaluated.push_back(evaluated(*whole[i]));
-  }
+  for (std::size_t i = 0; i < whole.size(); i += each) sample.evaluated.push_back(*whole[i]);
   return sample;
 }
 

@@ -357,6 +357,8 @@ try {
   live.kill("SIGINT");
   check((await live.ended) === 85, "the run was not stopped");
   await until(page, `/^stopped/.test(document.getElementById("state").textContent)`, "a stopped run is seen");
+  const fresh = `fetch(location.href).then((answer) => answer.text()).then((text) => new DOMParser().parseFromString(text, "text/html").getElementById("snippet").textContent)`;
+  check((await page.run(`document.getElementById("snippet").textContent`)) === (await page.run(fresh)), "the parameters are not the last best's");
 
   // A drive, played by keys, and its address opened again.
   await page.run(`(() => { const t = document.querySelector("#watch-controls input[type=number]"); t.value = 7; t.focus(); })()`);

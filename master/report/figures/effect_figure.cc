@@ -7,8 +7,11 @@
 #include <numbers>
 #include <optional>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/pose/extent.h"
 #include "common/svg/svg.h"
+#include "master/report/html.h"
 
 namespace gapfarm {
 namespace {
@@ -35,24 +38,22 @@ struct Scene {
 
 // Seen from X_WS.
 Scene scene_of(const Effect& effect, std::span<const double> values, const Pose& X_WS) {
+  const auto value = [&](std::string_view key) -> std::optional<double> {
+    for (std::size_t i = effect.strengths; i < effect.parameters.size(); ++i) {
+      if (effect.parameters[i].key == key) return values[i];
+    }
+    return {};
+  };
   Scene scene;
-  std::optional<double> position;
-  bool along_x = false;
-  Pose centre;
-  bool has_centre = false;
-  for (std::size_t i = effect.strengths; i < effect.parameters.size(); ++i) {
-    const std::string& key = effect.parameters[i].key;
-    if (key == "direction") scene.direction = values[i];
-    if (key == "radius") scene.radius_m = values[i];
-    if (key == "position") position = values[i];
-    if (key == "axis") along_x = values[i] != 0;
-    if (key == "x") centre.x = values[i];
-    if (key == "y") centre.y = values[i];
-    has_centre = has_centre || key == "x";
+  scene.direction = value("direction");
+  scene.radius_m = value("radius").value_or(0);
+  if (const auto x = value("x")) {
+    scene.centre = Pose{*x - X_WS.x, value("y").value_or(0) - X_WS.y, 0};
   }
-  if (has_centre) scene.centre = Pose{centre.x - X_WS.x, centre.y - X_WS.y, 0};
-  if (position && along_x) scene.line_y = *position - X_WS.y;
-  if (position && !along_x) scene.line_x = *position - X_WS.x;
+  if (const auto position = value("position")) {
+    const bool along_x = value("axis").value_or(0) != 0;
+    (along_x ? scene.line_y : scene.line_x) = *position - (along_x ? X_WS.y : X_WS.x);
+  }
   return scene;
 }
 
@@ -67,7 +68,7 @@ class View {
       box.add(drive.end);
     };
     reach_all(drives.without);
-    std::for_each(drives.with.begin(), drives.with.end(), reach_all);
+    std::ranges::for_each(drives.with, reach_all);
     const double width = kPanelWidth - 2 * kMargin;
     const double height = kPanelHeight - kPlotTop - 2 * kMargin;
     scale_ = std::min(width / std::max(box.x1 - box.x0, kLeastSpan_m),
@@ -88,9 +89,7 @@ class View {
 void draw(Svg& svg, const View& view, const LoggedDrive& drive, const SvgStyle& style,
           const char* fill) {
   constexpr double kHeading_px = 20;
-  std::vector<SvgPoint> points;
-  for (const Pose& X : drive.path) points.push_back(view.at(X));
-  svg.polyline(points, style);
+  svg.polyline(mapped(drive.path, [&](const Pose& X) { return view.at(X); }), style);
   const SvgPoint end = view.at(drive.end);
   const SvgPoint tip = {end.x + kHeading_px * std::cos(drive.end.theta),
                         end.y - kHeading_px * std::sin(drive.end.theta)};
@@ -158,16 +157,14 @@ std::string difference(const EffectDrives& drives) {
 }
 
 std::string values_text(const Effect& effect, std::span<const double> values) {
-  std::string text;
+  std::vector<std::string> texts;
   for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
     const Parameter& p = effect.parameters[i];
-    text += text.empty() ? "" : ", ";
-    text += p.key + " = ";
-    text += p.choices.empty() ? fmt::format("{:.4g}", values[i])
-                              : p.choices[static_cast<std::size_t>(values[i])];
-    if (p.choices.empty() && p.unit != "-") text += " " + p.unit;
+    texts.push_back(p.key + " = " +
+                    (p.choices.empty() ? with_unit(fmt::format("{:.4g}", values[i]), p.unit)
+                                       : p.choices[static_cast<std::size_t>(values[i])]));
   }
-  return text;
+  return joined(texts);
 }
 
 void draw_panel(Svg& svg, SvgPoint corner, const Scene& scene, const EffectDrives& drives) {

@@ -9,6 +9,8 @@
 #include <numbers>
 #include <tuple>
 
+#include "common/base/ranges.h"
+#include "common/pose/extent.h"
 #include "common/score/motion_model.h"
 #include "common/svg/svg.h"
 #include "master/report/prediction_table.h"
@@ -101,13 +103,9 @@ std::vector<SvgPoint> ellipse_mm(const PoseCloud& cloud) {
   return points;
 }
 
-struct Range {
-  double low = 0, high = 0;
-};
-
-// The bulk of `values`: their quartiles' range, widened by twice itself on both sides, but no
-// farther than the values go.
-Range bulk(std::vector<double> values) {
+// Ends of the bulk of `values`: their quartiles' range, widened by twice itself on both sides, but
+// no farther than the values go.
+std::pair<double, double> bulk(std::vector<double> values) {
   std::ranges::sort(values);
   const double q1 = values[values.size() / 4], q3 = values[values.size() * 3 / 4];
   const double reach = 2 * (q3 - q1) + 5;
@@ -115,25 +113,18 @@ Range bulk(std::vector<double> values) {
 }
 
 Window frame(const PosePanel& panel, SvgPoint corner) {
-  std::vector<double> xs, ys;
-  for (const Pose& pose : panel.measured) {
-    xs.push_back(1000 * pose.x);
-    ys.push_back(1000 * pose.y);
-  }
-  Range x{1e30, -1e30}, y{1e30, -1e30};
-  if (!xs.empty()) {
-    x = bulk(xs);
-    y = bulk(ys);
+  Extent box;  // mm; without a place it is about the start
+  if (!panel.measured.empty()) {
+    const auto [x0, x1] = bulk(mapped(panel.measured, [](const Pose& X) { return 1000 * X.x; }));
+    const auto [y0, y1] = bulk(mapped(panel.measured, [](const Pose& X) { return 1000 * X.y; }));
+    box.add({x0, y0, 0});
+    box.add({x1, y1, 0});
   }
   for (const PoseCloud& cloud : panel.clouds) {
-    for (const SvgPoint& point : ellipse_mm(cloud)) {
-      x = {std::min(x.low, point.x), std::max(x.high, point.x)};
-      y = {std::min(y.low, point.y), std::max(y.high, point.y)};
-    }
+    for (const SvgPoint& point : ellipse_mm(cloud)) box.add({point.x, point.y, 0});
   }
-  if (x.low > x.high) x = y = {0, 0};
-  const double span = 1.16 * std::max({x.high - x.low, y.high - y.low, kSmallestSpan_mm});
-  return {(x.low + x.high - span) / 2, (y.low + y.high - span) / 2, span, corner};
+  const double span = 1.16 * std::max(box.longer_side(), kSmallestSpan_mm);
+  return {(box.x0 + box.x1 - span) / 2, (box.y0 + box.y1 - span) / 2, span, corner};
 }
 
 void draw_axes(Svg& svg, const PosePanel& panel, const Window& window) {
@@ -171,10 +162,7 @@ void draw_mark(Svg& svg, SvgPoint p, const CloudLook& look) {
       svg.rectangle({p.x - r + 0.5, p.y - r + 0.5}, 2 * r - 1, 2 * r - 1, style);
       break;
     case 'd': {
-      SvgStyle full = style;
-      full.fill = look.colour;
-      full.stroke = "#ffffff";
-      full.stroke_width = 1.2;
+      const SvgStyle full{.fill = look.colour, .stroke = "#ffffff", .stroke_width = 1.2};
       svg.polyline(
           {{p.x, p.y - r - 1.5}, {p.x + r + 1.5, p.y}, {p.x, p.y + r + 1.5}, {p.x - r - 1.5, p.y}},
           full, true);
@@ -198,8 +186,8 @@ void draw_measured_mark(Svg& svg, SvgPoint p, double theta) {
 // `heading_px`: length of the heading's line; longer ones below show beside shorter ones on top.
 void draw_cloud(Svg& svg, const PoseCloud& cloud, const CloudLook& look, double heading_px,
                 const Window& window) {
-  std::vector<SvgPoint> outline;
-  for (const SvgPoint& point : ellipse_mm(cloud)) outline.push_back(window.at(point.x, point.y));
+  const std::vector<SvgPoint> outline =
+      mapped(ellipse_mm(cloud), [&](const SvgPoint& point) { return window.at(point.x, point.y); });
   svg.polyline(outline, {.fill = look.colour, .opacity = 0.09}, true);
   svg.polyline(outline, {.stroke = "#ffffff", .stroke_width = 4, .opacity = 0.7}, true);
   svg.polyline(outline, {.stroke = look.colour, .stroke_width = 2, .dash = look.dash}, true);
@@ -238,10 +226,8 @@ void draw_legend(Svg& svg, const std::vector<PosePanel>& panels, SvgPoint place)
   draw_measured_mark(svg, {place.x + 4, place.y}, 0.5);
   svg.text({place.x + 22, place.y + 4}, "measured, tick along heading", text_style);
   double x = place.x + 230;
-  const PosePanel* fullest = &panels.front();
-  for (const PosePanel& panel : panels) {
-    if (panel.clouds.size() > fullest->clouds.size()) fullest = &panel;
-  }
+  const auto fullest = std::ranges::max_element(
+      panels, {}, [](const PosePanel& panel) { return panel.clouds.size(); });
   for (std::size_t i = 0; i < fullest->clouds.size(); ++i) {
     const CloudLook& look = kLooks[i % kPoseCloudStyles];
     svg.line({x, place.y}, {x + 36, place.y},
@@ -265,12 +251,12 @@ std::vector<PosePanel> pose_panels(const Problem& problem,
         resolved_command(problem.log.trials[members.front()], problem.commands);
     PosePanel panel;
     panel.title = fmt::format("{}, {} s", command.name, driven.duration_s);
-    for (std::size_t i : members) {
-      panel.measured.push_back(between(problem.log.trials[i].X_WS, problem.log.trials[i].X_WE));
-    }
-    for (const PredictionOfLog& prediction : predictions) {
-      panel.clouds.push_back(mean_cloud(problem, prediction, members));
-    }
+    panel.measured = mapped(members, [&](std::size_t i) {
+      return between(problem.log.trials[i].X_WS, problem.log.trials[i].X_WE);
+    });
+    panel.clouds = mapped(predictions, [&](const PredictionOfLog& prediction) {
+      return mean_cloud(problem, prediction, members);
+    });
     panels.push_back(std::move(panel));
   }
   return panels;

@@ -41,6 +41,8 @@ function binsOf(values) {
 
 // --- what the effects have to do with places ---
 
+const effectNamed = (name) => (PAGE.effects || []).find((e) => e.name === name);
+
 const circle = (x, y, r) => Array.from({ length: 61 }, (_, i) =>
   [x + r * Math.cos((2 * Math.PI * i) / 60), y + r * Math.sin((2 * Math.PI * i) / 60)]);
 
@@ -49,7 +51,7 @@ function seamLayers(frame) {
   const acrossY = valueOf("camera_seam.axis") === "y";
   const { min, max } = acrossY ? frame.x : frame.y;
   const point = (along, across) => (acrossY ? [along, across] : [across, along]);
-  const found = (PAGE.effects || []).find((e) => e.name === "camera_seam")?.parameters.position;
+  const found = effectNamed("camera_seam").parameters.position;
   const layers = [];
   if (found && found.lo < found.hi) {
     layers.push({ kind: "area", style: "place", dashed: true, name: "seam, 90 % interval",
@@ -81,29 +83,23 @@ function lensLayers(frame) {
 
 function placeLayers(frame) {
   const layers = [];
-  const named = new Set((PAGE.effects || []).map((e) => e.name));
-  for (const name of ["friction_patch", "friction_patch_2"].filter((n) => named.has(n))) {
+  for (const name of ["friction_patch", "friction_patch_2"].filter(effectNamed)) {
     const [x, y, r, ratio] = ["x", "y", "radius", "ratio"].map((k) => valueOf(`${name}.${k}`));
     layers.push({ kind: "area", style: "place", points: circle(x, y, r), name: "patch" });
     layers.push({ kind: "text", style: "place", text: `patch: ${numberText(ratio, 2)} × the friction`, points: [[x, y]], anchor: "middle" });
   }
-  if (named.has("camera_seam")) layers.push(...seamLayers(frame));
-  if (named.has("camera_distortion")) layers.push(...lensLayers(frame));
+  if (effectNamed("camera_seam")) layers.push(...seamLayers(frame));
+  if (effectNamed("camera_distortion")) layers.push(...lensLayers(frame));
   return layers;
 }
 
 // Directions have no place: arrows in a corner.
-function directionsOf() {
-  const named = new Set((PAGE.effects || []).map((e) => e.name));
-  return [["floor_tilt", "downhill"], ["floor_nap", "with the nap"]]
-    .filter(([name]) => named.has(name))
-    .map(([name, label]) => ({ angle: valueOf(`${name}.direction`), label }));
-}
-
 function drawCorner(group, { box, toX }, times) {
   const ink = colour("ink");
   const ground = { stroke: colour("card"), "stroke-width": 4, "paint-order": "stroke", "font-size": 12, fill: ink };
-  directionsOf().forEach(({ angle, label }, i) => {
+  const directions = [["floor_tilt", "downhill"], ["floor_nap", "with the nap"]].filter(([name]) => effectNamed(name));
+  directions.forEach(([name, label], i) => {
+    const angle = valueOf(`${name}.direction`);
     const [x, y] = [box.right - 34, box.top + 34 + 66 * i];
     const [dx, dy] = [22 * Math.cos(angle), -22 * Math.sin(angle)];
     svgElement(group, "path", { d: arrowPath([x - dx, y - dy, x + dx, y + dy], 11), stroke: colour("place"), "stroke-width": 3, fill: "none" });
@@ -125,18 +121,14 @@ function drawCorner(group, { box, toX }, times) {
 // --- the section ---
 
 function floorLayers(some, model, measure, ends, shown, times) {
-  const binOf = (v) => ends.findIndex((end) => v <= end);
   const layers = [];
   const bins = groupBy(some, (f) => {
-    const bin = binOf(measure.of(f.trial, model));
+    const bin = ends.findIndex((end) => measure.of(f.trial, model) <= end);
     return bin < 0 ? ends.length : bin;
   });
-  for (const bin of [...bins.keys()].sort((a, b) => a - b)) {
-    const group = bins.get(bin);
-    if (shown.has("drives")) {
-      layers.push({ kind: "arrows", style: `scale-${bin}`, width: 1 + 0.3 * bin, faint: some.length > 150 && bin < 2 ? 0.55 : 0.9,
-                    arrows: group.map((f) => [f.start.x, f.start.y, f.end.x, f.end.y, f.trial]), name: "drive" });
-    }
+  for (const bin of shown.has("drives") ? distinct(bins.keys()) : []) {
+    layers.push({ kind: "arrows", style: `scale-${bin}`, width: 1 + 0.3 * bin, faint: some.length > 150 && bin < 2 ? 0.55 : 0.9,
+                  arrows: bins.get(bin).map((f) => [f.start.x, f.start.y, f.end.x, f.end.y, f.trial]), name: "drive" });
   }
   if (shown.has("errors")) {
     layers.push({ kind: "arrows", style: "ink", width: 1, head: 4, faint: 0.75, name: `error times ${times}`,
@@ -157,7 +149,7 @@ function fillLegend(legend, ends, measure) {
   legend.replaceChildren();
   for (let i = 0; i <= ends.length; ++i) {
     const item = element(legend, "li");
-    element(item, "span", { className: `chip chip-${i}` });
+    element(item, "span", { className: "chip" }).style.background = `var(--scale-${i})`;
     item.append(text(i));
   }
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
@@ -22,13 +21,12 @@ namespace {
 
 constexpr std::size_t kMostVolumes = 1000;
 
-// What a plot can show of it.
-Json short_list(const std::vector<double>& values, int digits) {
-  Json list = Json::array();
-  for (const double v : values) {
-    list.push_back(std::strtod(fmt::format("{:.{}g}", v, digits).c_str(), nullptr));
-  }
-  return list;
+// Why there is no best individual; nothing where there is one.
+const char* without_best(const RunReport& report) {
+  if (report.generations.empty()) return "No generation was completed yet.";
+  const auto has_best = [](const RunGeneration& g) { return g.best.has_value(); };
+  return std::ranges::any_of(report.generations, has_best) ? ""
+                                                           : "No individual has a fitness yet.";
 }
 
 }  // namespace
@@ -67,8 +65,7 @@ Json front_json(const RunReport& report) {
     objectives.push_back({{"name", name}, {"maximise", maximise}});
   }
   for (const StoredIndividual& member : front.members) {
-    const auto values = mapped(member.objectives, &NamedValue::second);
-    members.push_back({{"id", member.birth_id}, {"values", short_list(values, 7)}});
+    members.push_back({{"id", member.birth_id}, {"values", written_values(member.objectives, 7)}});
   }
   std::vector<std::pair<std::uint64_t, double>> known;
   for (std::size_t i = 0; i < front.hypervolume.size(); ++i) {
@@ -78,12 +75,12 @@ Json front_json(const RunReport& report) {
   }
   for (const auto& [generation, volume] :
        decimated(known, kMostVolumes, [](const auto& at) { return at.second; })) {
-    volumes.push_back({generation, short_list({volume}, 7)[0]});
+    volumes.push_back({generation, as_written(volume, 7)});
   }
   return {{"objectives", std::move(objectives)},
           {"members", std::move(members)},
           {"knee", front.knee},
-          {"reference", short_list(front.reference, 7)},
+          {"reference", written(front.reference, 7)},
           {"hypervolume", std::move(volumes)}};
 }
 
@@ -91,15 +88,15 @@ Json sample_json(const RunReport& report) {
   Json genes = Json::array(), evaluated = Json::array();
   for (const RunSample::GeneShare& gene : report.sample.genes) {
     genes.push_back({{"key", gene.key},
-                     {"unit", gene.unit == "-" ? "" : gene.unit},
+                     {"unit", gene.unit},
                      {"lower", gene.lower},
                      {"upper", gene.upper},
                      {"log", gene.log},
-                     {"importance", short_list(gene.importance, 3)}});
+                     {"importance", written(gene.importance, 3)}});
   }
-  for (const RunSample::Evaluated& one : report.sample.evaluated) {
-    evaluated.push_back({one.birth_id, short_list({one.fitness}, 6)[0], short_list(one.shares, 3),
-                         short_list(one.objectives, 5)});
+  for (const StoredIndividual& one : report.sample.evaluated) {
+    evaluated.push_back({one.birth_id, as_written(*one.fitness, 6), written(one.genome, 3),
+                         written_values(one.objectives, 5)});
   }
   return {{"genes", std::move(genes)}, {"evaluated", std::move(evaluated)}};
 }
@@ -112,8 +109,6 @@ constexpr auto kScore = [](auto& v, auto& row) {
   FIELDS(name);
   IF_ANY(score);
 };
-
-constexpr int kRunPlotDigits = 7;
 
 struct Errors {
   double position_mm = 0, heading_mrad = 0, score = 0;
@@ -134,9 +129,7 @@ Errors errors_of(const std::vector<DiagnosedTrial>& trials, bool after) {
 }
 
 std::string tile(const std::string& title, double before, double after, const std::string& unit) {
-  return fmt::format(
-      R"(<div class="tile"><dt>{}</dt><dd><span class="from">{}</span> <span aria-label="to">→</span> <strong>{}</strong> {}</dd></div>)",
-      title, number_text(before), number_text(after), unit);
+  return html_tile(title, number_text(before), number_text(after), unit);
 }
 
 std::string summary(const RunReport& report) {
@@ -172,14 +165,9 @@ std::string score_table(const std::vector<ScoreRow>& rows, const std::string& co
   return html_table("parts", file, file, {{""}, {html_escaped(column), "number", "score"}}, lines);
 }
 
-std::string fitness_names(const RunReport& report) {
-  return report.fitness + (report.unit.empty() || report.unit == "-" ? "" : ", " + report.unit);
-}
-
 std::string scores(const RunReport& report) {
   if (report.objective) return "";
-  std::string html =
-      R"(<section id="scores"><h2>On trials )" + term("validation", "held out") + "</h2>";
+  std::string html;
   const RunOutcome none;
   const RunOutcome& outcome = report.outcome ? *report.outcome : none;
   if (outcome.validation.empty()) {
@@ -187,21 +175,22 @@ std::string scores(const RunReport& report) {
         "<p>None were: [validation] in the config names files that evolution does not see. What "
         "stands above is of the trials that were evolved on.</p>";
   } else {
-    html += score_table(outcome.validation, fitness_names(report), "kept-apart");
+    html +=
+        score_table(outcome.validation, with_unit(report.fitness, report.unit, ", "), "kept-apart");
   }
   if (!outcome.baselines.empty()) {
     html += "<h3>" + term("baseline", "Without a simulation") + "</h3>" +
             score_table(outcome.baselines, "nats a trial", "baselines");
   }
-  return html + "</section>\n";
+  return html_section("scores", "On trials " + term("validation", "held out"), html);
 }
 
 std::string progress(const RunReport& report) {
-  if (report.generations.empty()) {
-    return R"(<section id="progress"><h2>Fitness</h2><p>No generation was completed yet.</p></section>)";
+  if (const std::string why = without_best(report); !why.empty()) {
+    return html_section("progress", "Fitness", "<p>" + why + "</p>");
   }
-  return R"(<section id="progress"><h2>Fitness by )" + term("generation", "generation") + "</h2>" +
-         plot_area("progress") + "</section>\n";
+  return html_section("progress", "Fitness by " + term("generation", "generation"),
+                      plot_area("progress"));
 }
 
 constexpr ModelNames kModelsOfRun = {"before", "after"};
@@ -247,9 +236,9 @@ Json page_json(const RunReport& report) {
   for (const ParameterRow& row : report.parameters) {
     // Effects that were searched have places, too.
     if (row.effect.empty()) continue;
-    bool there = false;
-    for (const Json& effect : page["effects"]) there = there || effect["name"] == row.effect;
-    if (!there) page["effects"].push_back({{"name", row.effect}, {"parameters", Json::object()}});
+    const auto name = [](const Json& effect) { return effect["name"].get<std::string>(); };
+    if (contains(page["effects"], row.effect, name)) continue;
+    page["effects"].push_back({{"name", row.effect}, {"parameters", Json::object()}});
   }
   if (report.pieces) {
     page["pictures"] = {
@@ -301,7 +290,8 @@ std::string run_html(const RunReport& report) {
   frame.add("parameters", "Parameters",
             parameters_section(
                 report.parameters, {},
-                {{"before", "before"}, {"after", "after"}, {"population", "last generation"}}));
+                {{"before", "before"}, {"after", "after"}, {"population", "last generation"}},
+                without_best(report)));
   frame.add("front", "Front", front_section(report));
   frame.add("genes", "Genes", densities_section(report));
   frame.add("elite", "Elite", elite_section(report));
@@ -321,12 +311,11 @@ std::string run_html(const RunReport& report) {
   frame.add("genomes", "Genomes", genomes_section(report));
   frame.add("farm", "Farm", farm_section(report.farm));
   frame.add("provenance", "Inputs",
-            R"(<section id="provenance"><h2>What went in</h2>)" +
-                html_definitions(report.provenance) + "</section>\n");
+            html_section("provenance", "What went in", html_definitions(report.provenance)));
   frame.add("words", "Words", glossary_section(run_terms()));
   Diagnosis table;
   if (report.outcome) table.trials = report.outcome->trials;
-  return framed_page(frame, page_json(report), trials_json(table, kRunPlotDigits));
+  return framed_page(frame, page_json(report), trials_json(table, kPlotDigits));
 }
 
 }  // namespace gapfarm

@@ -3,10 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -15,26 +15,6 @@ namespace gapfarm {
 namespace {
 
 constexpr std::size_t kMostPoints = 2000;  // of a line: more than a screen can show
-
-// What a plot can show: more digits would only be sent.
-double significant(double value) {
-  return std::strtod(fmt::format("{:.7g}", value).c_str(), nullptr);
-}
-
-Json significant_all(const std::vector<double>& values) {
-  Json list = mapped(values, significant);
-  return list;
-}
-
-Json significant_or_null(const std::optional<double>& value) {
-  return value ? Json(significant(*value)) : Json(nullptr);
-}
-
-std::string list_of(const std::vector<std::string>& lines, const char* css_class) {
-  std::string html = fmt::format(R"(<ul class="{}">)", css_class);
-  for (const std::string& line : lines) html += "<li>" + html_escaped(line) + "</li>";
-  return html + "</ul>";
-}
 
 std::string worker_table(const RunFarm& farm) {
   if (farm.workers.empty()) return "<p>No worker has been heard of by this run's last master.</p>";
@@ -57,9 +37,8 @@ std::string worker_table(const RunFarm& farm) {
 
 std::string log_html(const std::vector<std::string>& lines) {
   if (lines.empty()) return "<p>It has no log.txt, or an empty one.</p>";
-  std::string text;
-  for (const std::string& line : lines) text += html_escaped(line) + "\n";
-  return R"(<div class="snippet log"><pre tabindex="0">)" + text + "</pre></div>";
+  return R"(<div class="snippet log"><pre tabindex="0">)" + html_escaped(joined(lines, "\n")) +
+         "\n</pre></div>";
 }
 
 constexpr const char* kLittleIsKnown =
@@ -88,6 +67,18 @@ std::string timeline_html(const RunTimeline& timeline) {
 
 }  // namespace
 
+Json written(const std::optional<double>& value, int digits) {
+  return value ? Json(as_written(*value, digits)) : Json(nullptr);
+}
+
+Json written(const std::vector<double>& values, int digits) {
+  return mapped(values, [&](double value) { return as_written(value, digits); });
+}
+
+Json written_values(const std::vector<NamedValue>& values, int digits) {
+  return written(mapped(values, &NamedValue::second), digits);
+}
+
 std::string state_line(const RunFarm& farm) {
   std::string text = html_escaped(farm.state);
   for (const auto& [label, value] : farm.facts) {
@@ -99,16 +90,16 @@ std::string state_line(const RunFarm& farm) {
 
 std::string operators_section(const RunReport& report) {
   if (report.operators.empty() && report.generations.empty()) return "";
-  if (report.operators.empty()) {
-    return R"(<section id="operators"><h2>How often each operator is drawn</h2><p>Nothing to show: this run's optimiser has no )" +
-           term("operator", "operators") +
-           ", which only the genetic algorithm draws.</p></section>\n";
-  }
-  return R"(<section id="operators"><h2>How often each operator is drawn</h2><p>The )" +
-         term("operator", "operators") +
-         R"( that made better offspring are drawn more often: the probabilities by generation.</p>)"
-         R"(<ul class="key" id="operator-key" aria-label="Key"></ul><div id="operator-plot"></div>)" +
-         kNoScript + "</section>\n";
+  const std::string operators = term("operator", "operators");
+  return html_section(
+      "operators", "How often each operator is drawn",
+      report.operators.empty()
+          ? "<p>Nothing to show: this run's optimiser has no " + operators +
+                ", which only the genetic algorithm draws.</p>"
+          : "<p>The " + operators +
+                R"( that made better offspring are drawn more often: the probabilities by generation.</p>)"
+                R"(<ul class="key" id="operator-key" aria-label="Key"></ul><div id="operator-plot"></div>)" +
+                kNoScript);
 }
 
 std::string densities_section(const RunReport& report) {
@@ -140,22 +131,21 @@ std::string replay_cell(const std::string& run, std::uint64_t birth_id, const ch
 
 std::string genome_table(const RunReport& report, const std::vector<RunGenome>& genomes,
                          const char* where, const char* caption) {
-  const std::string unit = report.unit.empty() || report.unit == "-" ? "" : ", " + report.unit;
   std::vector<HtmlRow> rows;
-  for (const RunGenome& g : genomes) {
-    std::string parents;
-    for (const std::uint64_t p : g.parents)
-      parents += (parents.empty() ? "" : ", ") + std::to_string(p);
-    rows.push_back({std::to_string(g.birth_id),
-                    {std::to_string(g.generation),
-                     g.fitness ? number_text(*g.fitness, 7) : html_escaped(g.outcome),
-                     html_escaped(g.operators), parents.empty() ? "–" : parents,
-                     replay_cell(report.name, g.birth_id, where)}});
+  for (const auto& [generation, one] : genomes) {
+    const std::string parents =
+        joined(one.parents, ", ", [](std::uint64_t parent) { return std::to_string(parent); });
+    rows.push_back({std::to_string(one.birth_id),
+                    {std::to_string(generation),
+                     one.fitness ? number_text(*one.fitness, 7) : html_escaped(one.outcome),
+                     html_escaped(one.operators), parents.empty() ? "–" : parents,
+                     replay_cell(report.name, one.birth_id, where)}});
   }
   return html_table("cards", where, caption,
                     {{"genome"},
                      {"generation", "number"},
-                     {html_escaped(report.fitness + unit), "number", html_escaped(report.fitness)},
+                     {html_escaped(with_unit(report.fitness, report.unit, ", ")), "number",
+                      html_escaped(report.fitness)},
                      {"made by"},
                      {"of"},
                      {"evaluate it again, to the bit", "", "again"}},
@@ -168,7 +158,7 @@ std::string genome_form(const RunReport& report) {
   return fmt::format(
       R"(<form action="/view#genomes" class="controls" id="genome-form"><input type="hidden" name="of" value="{}"><label>Best of generation <input type="number" name="best_of" min="1" value="{}"></label><label>Any genome by its number <input type="number" name="genome" min="0"{}></label><button>Show</button></form>)",
       html_escaped(report.name), report.genomes_of,
-      report.looked_up ? fmt::format(R"( value="{}")", report.looked_up->birth_id) : "");
+      report.looked_up ? fmt::format(R"( value="{}")", report.looked_up->individual.birth_id) : "");
 }
 
 std::string looked_up_html(const RunReport& report) {
@@ -176,10 +166,10 @@ std::string looked_up_html(const RunReport& report) {
     return "<p>" + html_escaped(report.without_looked_up) + "</p>";
   }
   if (!report.looked_up) return "";
-  std::string html = fmt::format("<h3>Genome {}</h3>", report.looked_up->birth_id) +
+  std::string html = fmt::format("<h3>Genome {}</h3>", report.looked_up->individual.birth_id) +
                      genome_table(report, {*report.looked_up}, "genome", "The genome asked for") +
                      R"(<dl class="provenance">)";
-  for (const auto& [key, value] : report.looked_up->values) {
+  for (const auto& [key, value] : report.looked_up_values) {
     html += "<div><dt><code>" + html_escaped(key) + "</code></dt><dd>" + html_escaped(value) +
             "</dd></div>";
   }
@@ -209,35 +199,31 @@ Json generations_json(const RunReport& report) {
   const auto best = [](const RunGeneration& g) { return g.best.value_or(0); };
   for (const RunGeneration& g : decimated(report.generations, kMostPoints, best)) {
     list.push_back({{"generation", g.generation},
-                    {"best", significant_or_null(g.best)},
-                    {"median", significant_or_null(g.median)},
-                    {"worst", significant_or_null(g.worst)},
+                    {"best", written(g.best)},
+                    {"median", written(g.median)},
+                    {"worst", written(g.worst)},
                     {"evaluations", g.evaluations},
-                    {"wall_s", significant(g.wall_s)}});
+                    {"wall_s", written(g.wall_s)}});
   }
   return list;
 }
 
 Json operators_json(const RunReport& report) {
-  Json shares = mapped(report.probabilities, significant_all);
+  const auto shares = [](const std::vector<double>& drawn) { return written(drawn); };
   return {{"names", report.operators},
           {"generations", report.probability_generations},
-          {"probabilities", std::move(shares)}};
+          {"probabilities", mapped(report.probabilities, shares)}};
 }
 
 Json elite_json(const RunReport& report) {
   Json axes = Json::array(), lines = Json::array();
-  for (const RunElite::Axis& axis : report.elite.axes) {
-    axes.push_back({{"key", axis.key},
-                    {"unit", axis.unit == "-" ? "" : axis.unit},
-                    {"lower", axis.lower},
-                    {"upper", axis.upper}});
+  for (const auto& [key, unit, lower, upper] : report.elite.axes) {
+    axes.push_back({{"key", key}, {"unit", unit}, {"lower", lower}, {"upper", upper}});
   }
   for (const RunElite::Line& line : report.elite.lines) {
-    Json shares = mapped(line.shares, significant);
     lines.push_back({{"id", line.birth_id},
-                     {"fitness", significant_or_null(line.fitness)},
-                     {"shares", std::move(shares)},
+                     {"fitness", written(line.fitness)},
+                     {"shares", written(line.shares)},
                      {"values", line.values}});
   }
   return {{"axes", std::move(axes)}, {"lines", std::move(lines)}};
@@ -247,28 +233,29 @@ Json densities_json(const RunReport& report) {
   Json list = mapped(report.densities, [&](const GeneDensity& d) -> Json {
     return {{"key", d.key},
             {"unit", d.unit},
-            {"edges", significant_all(d.edges)},
+            {"edges", written(d.edges)},
             {"generations", d.generations},
             {"counts", d.counts},
-            {"best", significant_all(d.best)}};
+            {"best", written(d.best)}};
   });
   return list;
 }
 
 std::string farm_section(const RunFarm& farm) {
   if (farm.state.empty()) return "";
-  std::string html = R"(<section id="farm"><h2>Farm</h2><div id="farm-now" data-live>)" +
-                     worker_table(farm) + "</div>" + timeline_html(farm.timeline) +
+  std::string html = R"(<div id="farm-now" data-live>)" + worker_table(farm) + "</div>" +
+                     timeline_html(farm.timeline) +
                      R"(<div id="farm-past" data-live><h3>Workers that failed</h3>)";
   html += farm.failures.empty() ? std::string("<p>None that this store reports.</p>")
-                                : list_of(farm.failures, "cautions");
+                                : html_list(farm.failures, "cautions");
   html += "<h3>What it coped with</h3>" + tally_html(farm);
   html += "<h3>What somebody should look at</h3>";
-  html += !farm.incidents.empty() ? list_of(farm.incidents, "cautions")
+  html += !farm.incidents.empty() ? html_list(farm.incidents, "cautions")
           : is_little_known(farm)
               ? std::string(kLittleIsKnown)
               : std::string("<p>Nothing: no task was given up, and no two answers differed.</p>");
-  return html + "<h3>The end of its log</h3>" + log_html(farm.log) + "</div></section>\n";
+  return html_section("farm", "Farm",
+                      html + "<h3>The end of its log</h3>" + log_html(farm.log) + "</div>");
 }
 
 Json timeline_json(const RunFarm& farm) {

@@ -4,9 +4,15 @@
 #include <string>
 
 #include "common/json/json.h"
+#include "master/report/html.h"
 #include "master/report/run/run_report.h"
 
 namespace gapfarm {
+
+// For plots: numbers with no more digits than these can show; null where there is none.
+Json written(const std::optional<double>& value, int digits = kPlotDigits);
+Json written(const std::vector<double>& values, int digits = kPlotDigits);
+Json written_values(const std::vector<NamedValue>& values, int digits);
 
 // "running, 38.1 evaluations/s, about 3 min left", in a line of its own.
 std::string state_line(const RunFarm& farm);

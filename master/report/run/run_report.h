@@ -59,15 +59,7 @@ struct RunWorker : WorkerStatus {
   std::string failure;  // the last of this name, with its time; empty: none
 };
 
-struct RunGenome {
-  std::uint64_t birth_id = 0;
-  std::uint64_t generation = 0;  // it was a member of, first
-  std::optional<double> fitness;
-  std::string outcome, operators;
-  std::vector<std::uint64_t> parents;
-  // Of one that was looked up: each searched parameter and its value with unit.
-  std::vector<std::pair<std::string, std::string>> values;
-};
+using RunGenome = RunReader::Member;
 
 // The best of the last generation over all genes, best first.
 struct RunElite {
@@ -93,16 +85,9 @@ struct RunSample {
     bool log = false;                // searched by its logarithm
     std::vector<double> importance;  // one each of `outputs`, [0, 1]
   };
-  struct Evaluated {
-    std::uint64_t birth_id = 0;
-    double fitness = 0;
-    std::vector<double> shares;  // of the ranges as they are searched, [0, 1]
-    std::vector<double> objectives;
-  };
   std::vector<std::string> outputs;  // the fitness, or several objectives
   std::vector<GeneShare> genes;
-  std::size_t members = 0;           // that the importance was worked out from
-  std::vector<Evaluated> evaluated;  // a thousand of them at most
+  std::vector<StoredIndividual> evaluated;  // a thousand of them at most, each with a fitness
 };
 
 // Which workers were there, all masters of the run together.  Empty where the store does not show.
@@ -165,7 +150,9 @@ struct RunReport {
   std::vector<RunGenome> genomes;      // best first, a few
   std::uint64_t genomes_of = 0;        // the generation that they are of
   std::optional<RunGenome> looked_up;  // the one that was asked for
-  std::string without_looked_up;       // why there is none, when one was asked for
+  // Of that one each searched parameter and its value with unit.
+  std::vector<std::pair<std::string, std::string>> looked_up_values;
+  std::string without_looked_up;  // why there is none, when one was asked for
   RunElite elite;
   RunFront front;
   RunSample sample;

@@ -216,6 +216,17 @@ TEST(RunHtml, KeepsWhatItWasGiven) {
   EXPECT_FALSE(parse_run_outcome("{}").ok());
 }
 
+TEST(RunHtml, SaysThatThereIsNoBestYet) {
+  RunReport report;
+  for (const char* why : {"No generation was completed yet.", "No individual has a fitness yet."}) {
+    const std::string html = run_html(report);
+    EXPECT_THAT(html, HasSubstr("<h2>Parameters</h2><p>" + std::string(why)));
+    EXPECT_THAT(html, HasSubstr("<h2>Fitness</h2><p>" + std::string(why)));
+    EXPECT_THAT(html, Not(HasSubstr("id=\"progress-plot\"")));
+    report.generations = {{1, {}, {}, {}, 24, 1}};
+  }
+}
+
 TEST(ReportHtml, NamesCannotInject) {
   const std::string attack = "\"'><script>alert(1)</script><!--";
   Diagnosis d = example_diagnosis();

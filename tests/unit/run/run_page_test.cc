@@ -92,15 +92,15 @@ TEST_F(RunPage, FindsAnyGenomeAndTheBestOfAnyGeneration) {
   const RunReport report = read(kPopulation * 2 + 3, 1);
   ASSERT_TRUE(report.looked_up);
   EXPECT_EQ(report.looked_up->generation, 2u);
-  ASSERT_EQ(report.looked_up->values.size(), 2u);
-  EXPECT_THAT(report.looked_up->values[1].second, HasSubstr("m/s"));
+  ASSERT_EQ(report.looked_up_values.size(), 2u);
+  EXPECT_THAT(report.looked_up_values[1].second, HasSubstr("m/s"));
   EXPECT_EQ(report.genomes_of, 1u);
-  EXPECT_EQ(report.genomes.front().birth_id, kPopulation);
+  EXPECT_EQ(report.genomes.front().individual.birth_id, kPopulation);
   EXPECT_THAT(run_html(report), HasSubstr("--genome " + std::to_string(kPopulation * 2 + 3)));
   EXPECT_THAT(read(999).without_looked_up, HasSubstr("999"));
   EXPECT_EQ(read({}, 77).genomes_of, 3u) << "there is no generation 77";
   ASSERT_EQ(report.farm.given_up.size(), 1u);
-  EXPECT_EQ(report.farm.given_up[0].birth_id, kPopulation * 3 - 1);
+  EXPECT_EQ(report.farm.given_up[0].individual.birth_id, kPopulation * 3 - 1);
 }
 
 TEST_F(RunPage, CountsTrialsHeldOutWhileTheirFileIsThere) {
