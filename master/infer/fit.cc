@@ -197,19 +197,15 @@ Fitter::Normal Fitter::normal(const Fit& fit, std::optional<std::size_t> without
   return normal;
 }
 
-Eigen::VectorXd Fitter::least_step(const Eigen::VectorXd& u) const {
-  return (space_.lower() - u).cwiseMax(-kLongestStep).cwiseMin(0.0);
-}
-
-Eigen::VectorXd Fitter::most_step(const Eigen::VectorXd& u) const {
-  return (space_.upper() - u).cwiseMin(kLongestStep).cwiseMax(0.0);
+Eigen::VectorXd Fitter::bounded_step(const Eigen::VectorXd& u, const Normal& equations) const {
+  return bounded_minimum(equations.matrix, equations.right,
+                         (space_.lower() - u).cwiseMax(-kLongestStep).cwiseMin(0.0),
+                         (space_.upper() - u).cwiseMin(kLongestStep).cwiseMax(0.0));
 }
 
 double Fitter::promise(const Fit& fit) const {
   const Normal equations = normal(fit, std::nullopt);
-  const Eigen::VectorXd delta =
-      bounded_minimum(equations.matrix, equations.right, least_step(fit.u), most_step(fit.u));
-  return equations.right.dot(delta) - 0.5 * delta.dot(equations.matrix * delta);
+  return equations.gain(bounded_step(fit.u, equations));
 }
 
 Status Fitter::step(Fit* fit) const {
@@ -218,11 +214,10 @@ Status Fitter::step(Fit* fit) const {
   }
   const Normal equations = normal(*fit, std::nullopt);
   for (int half = 0; half <= kMostHalvings; ++half) {
-    Eigen::MatrixXd damped = equations.matrix;
-    damped.diagonal() *= 1 + fit->damping;
-    const Eigen::VectorXd delta =
-        bounded_minimum(damped, equations.right, least_step(fit->u), most_step(fit->u));
-    const double promised = equations.right.dot(delta) - 0.5 * delta.dot(equations.matrix * delta);
+    Normal damped = equations;
+    damped.matrix.diagonal() *= 1 + fit->damping;
+    const Eigen::VectorXd delta = bounded_step(fit->u, damped);
+    const double promised = equations.gain(delta);
     if (promised < kSettledGain / 5) {
       fit->settled = fit->fresh;
       break;
@@ -265,18 +260,12 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
   std::vector<double> scores(observations_.size(), 0.0);
   const std::size_t folds = 1 + *std::ranges::max_element(observations_.fold);
   for (std::size_t f = 0; f < folds; ++f) {
-    const Normal equations = normal(fit, f);
-    const Eigen::VectorXd delta =
-        bounded_minimum(equations.matrix, equations.right, least_step(fit.u), most_step(fit.u));
-    const Eigen::VectorXd z = fit.z + fit.slopes * delta;
+    const Eigen::VectorXd z = fit.z + fit.slopes * bounded_step(fit.u, normal(fit, f));
     std::vector<Eigen::Index> in_sample;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       if (observations_.fold[i] != f) in_sample.push_back(static_cast<Eigen::Index>(i));
     }
-    Eigen::VectorXd seen(static_cast<Eigen::Index>(3 * in_sample.size()));
-    for (std::size_t k = 0; k < in_sample.size(); ++k) {
-      seen.segment<3>(static_cast<Eigen::Index>(3 * k)) = z.segment<3>(3 * in_sample[k]);
-    }
+    const Eigen::VectorXd seen = z.reshaped(3, z.size() / 3)(Eigen::all, in_sample).reshaped();
     const double scale = best_scale(seen, observations_.least_scale, observations_.most_scale);
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       if (observations_.fold[i] != f) continue;

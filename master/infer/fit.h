@@ -81,17 +81,21 @@ class Fitter {
   struct Normal {
     Eigen::MatrixXd matrix;
     Eigen::VectorXd right;
+
+    // Nats that a step gains, to second order.
+    double gain(const Eigen::VectorXd& delta) const {
+      return right.dot(delta) - 0.5 * delta.dot(matrix * delta);
+    }
   };
   Normal normal(const Fit& fit, std::optional<std::size_t> without_fold) const;
+  // The best step from `u` within the bounds, no coordinate farther than kLongestStep.
+  Eigen::VectorXd bounded_step(const Eigen::VectorXd& u, const Normal& equations) const;
   Eigen::Vector3d residual(std::size_t observation, const Pose& end) const;
   Eigen::VectorXd whitened(const std::vector<Pose>& ends) const;
   // What the coordinates without a parameter add there.
   Eigen::VectorXd beside(const Eigen::VectorXd& u) const;
   std::vector<Eigen::Index> columns_of_dimensions() const;
   void judge(Eigen::VectorXd z, Fit* fit) const;
-  // How far a step from there may go.
-  Eigen::VectorXd least_step(const Eigen::VectorXd& u) const;
-  Eigen::VectorXd most_step(const Eigen::VectorXd& u) const;
   Status step(Fit* fit) const;
 
   const Forward& forward_;
