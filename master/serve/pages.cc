@@ -137,7 +137,7 @@ bool is_wanted(const WorkEntry& e, const ListView& view) {
   return true;
 }
 
-// Works without scripts, too; with them while it is typed (list.js).
+// Works without scripts.
 std::string filter_form(const ListView& view) {
   std::string options;
   for (const char* state : {"", "running", "finished", "stopped", "failed"}) {
