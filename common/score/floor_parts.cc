@@ -27,10 +27,23 @@ void FloorParts::put(std::string_view name, double value) {
   if (name == "patch_ratio") patch_ratio_ = value;
 }
 
-double FloorParts::ratio_at(const Eigen::Vector2d& place) const {
+double FloorParts::under(const Pose* X_WR, const RobotWheel& wheel) const {
+  if (X_WR == nullptr) return 1;
+  const Pose at = *X_WR * Pose{wheel.x_m.value_or(0), wheel.y_m.value_or(0), 0};
+  const Eigen::Vector2d place = Eigen::Vector2d(at.x, at.y) - origin_m_;
   const Eigen::Vector2d normal(std::cos(edge_rad_), std::sin(edge_rad_));
   return ratio_beyond(edge_ratio_, normal.dot(place) - edge_m_) *
          ratio_beyond(patch_ratio_, patch_radius_m_ - (place - patch_m_).norm());
+}
+
+double FloorParts::under_driven(const Pose* X_WR, const GroundRobot& robot) const {
+  double sum = 0, driven = 0;
+  for (const RobotWheel& wheel : robot.wheels) {
+    if (!wheel.driven) continue;
+    sum += under(X_WR, wheel);
+    driven += 1;
+  }
+  return driven > 0 ? sum / driven : 1;
 }
 
 }  // namespace gapfarm

@@ -4,19 +4,29 @@
 #include <Eigen/Core>
 #include <string_view>
 
+#include "common/pose/pose.h"
+#include "common/robot/robot.h"
+
 namespace gapfarm {
 
-// Places are of the frame that its user says; ratios are of how far a wheel travels there.
+// Ratios are of how far a wheel travels there.
 class FloorParts {
  public:
+  // Places are counted from `origin_m` of the world.
+  explicit FloorParts(const Eigen::Vector2d& origin_m) : origin_m_(origin_m) {}
+
   // Takes a value of the kinematic model by its name (common/score/kinematic.h); others are none of
   // its business.
   void put(std::string_view name, double value);
 
   bool even() const { return edge_ratio_ == 1 && patch_ratio_ == 1; }
-  double ratio_at(const Eigen::Vector2d& place) const;
+  // Under a wheel of a robot that stands there; 1 where nobody knows where that is.
+  double under(const Pose* X_WR, const RobotWheel& wheel) const;
+  // The mean of the driven wheels.
+  double under_driven(const Pose* X_WR, const GroundRobot& robot) const;
 
  private:
+  Eigen::Vector2d origin_m_;
   double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
   Eigen::Vector2d patch_m_ = Eigen::Vector2d::Zero();
   double patch_radius_m_ = 0, patch_ratio_ = 1;

@@ -24,7 +24,7 @@ class Body {
   Body(const GroundRobot& robot, const Kinematics& at)
       : robot_(robot),
         load_(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0)),
-        origin_m_(at.origin_m),
+        floor_(at.origin_m),
         reach_m_(wheel_reach_m(robot)) {
     for (std::size_t i = 0; i < at.names.size(); ++i) {
       put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
@@ -112,7 +112,8 @@ class Body {
   Twist on_level(std::span<const WheelMotion> wheels, const RobotDrive& drive,
                  const Pose* X_WR) const {
     if (is_steered(robot_)) {
-      return on_floor(ahead_ * floor_under(X_WR, {}) * drive.traction_m_s(), drive.curvature());
+      return on_floor(ahead_ * floor_.under_driven(X_WR, robot_) * drive.traction_m_s(),
+                      drive.curvature());
     }
     if (is_holonomic(robot_)) {
       Eigen::VectorXd speeds(inverse_.cols()), tractions(inverse_.cols());
@@ -120,7 +121,7 @@ class Body {
       for (std::size_t i = 0; i < wheels.size(); ++i) {
         const RobotWheel& w = robot_.wheels[i];
         if (!w.driven) continue;
-        tractions[n] = traction_ * floor_under(X_WR, {*w.x_m, *w.y_m, 0});
+        tractions[n] = traction_ * floor_.under(X_WR, w);
         speeds[n++] = wheels[i].speed_m_s * std::cos(w.roller_angle_rad);
       }
       if (X_WR != nullptr && tractions != tractions_) {
@@ -136,8 +137,7 @@ class Body {
       if (!robot_.wheels[i].driven) continue;
       const RobotWheel& w = robot_.wheels[i];
       const int side = w.side == WheelSide::kLeft ? 0 : 1;
-      sum[side] +=
-          floor_under(X_WR, {w.x_m.value_or(0), w.y_m.value_or(0), 0}) * wheels[i].speed_m_s;
+      sum[side] += floor_.under(X_WR, w) * wheels[i].speed_m_s;
       count[side] += 1;
     }
     const double l = left_ * sum[0] / std::max(count[0], 1.0);
@@ -223,13 +223,6 @@ class Body {
     return {rolled * down[0], is_holonomic(robot_) ? rolled * down[1] : 0, 0};
   }
 
-  // What the floor makes of the travel of a wheel there.
-  double floor_under(const Pose* X_WR, const Pose& X_RW) const {
-    if (X_WR == nullptr) return 1;
-    const Pose at = *X_WR * X_RW;
-    return floor_.ratio_at(Eigen::Vector2d(at.x, at.y) - origin_m_);
-  }
-
   // What tyres make of a speed and a curvature: the acceleration to the side nears what the floor
   // holds and does not pass it, and the rear axle slips outwards by its share of that.
   Twist on_floor(double v, double curvature) const {
@@ -266,7 +259,6 @@ class Body {
   Eigen::Vector2d load_;              // where the weight stands on their wheels
   double sag_ = 0, drift_ = 0, rate_ = 0, scale_ = 1, aspect_ = 1;
   FloorParts floor_;
-  Eigen::Vector2d origin_m_;
   Eigen::Vector2d downhill_ = Eigen::Vector2d::Zero();  // in the tracker's frame
   double reach_m_;
   std::optional<double> grip_m_s2_;  // none: no speed slips
