@@ -10,7 +10,7 @@ mkdir -p "$out"
 echo '| robot | motors, N m s/rad | floor | truth | answered | in | beside it | verdict |'
 echo '|---|---|---|---|---|---|---|---|'
 seed=100
-for kind in differential skid; do
+for kind in differential skid tricycle; do
   for stiffness in 0.2 1; do
     for floor in 'tilt 0' 'tilt 0.02' 'tilt 0.04' 'tilt 0.1' 'edge 0.003' 'edge 0.008' 'patch 0.003' 'patch 0.008'; do
       read -r what size <<< "$floor"
