@@ -67,7 +67,19 @@ struct Candidate {
   WindowFit before;  // that it is compared with
   HeldOutGain held_out_gain;
   bool moved = false;  // both with all other values moved within their tolerances
+  bool may_be_named = false;
 };
+
+// Whether the interval of what says how much of it there is, its first parameter, excludes none:
+// what a few windows at a border gain may be theirs alone.
+bool shows_its_size(const WindowFitter& fitter, const GroundWork& work,
+                    const GroundHypothesis& hypothesis, const WindowFit& fit) {
+  if (!hypothesis.describe) return true;
+  NamedEffect effect;
+  hypothesis.describe(fitter, fit, work.seed, &effect);
+  const Estimate& size = effect.parameters.front();
+  return size.lo > 0 || size.hi < 0;
+}
 
 Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
                            const GroundSearch& search, const Offer& offer, WindowFit fit) {
@@ -137,7 +149,7 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
   };
   for (const Candidate& other : candidates) {
     const HeldOutGain over = held_out_gain(windows, chosen.held_out, other.held_out, work.seed);
-    if (over.lo <= 0 && may_be_named(other.held_out_gain)) add(other.offer.hypothesis);
+    if (over.lo <= 0 && other.may_be_named) add(other.offer.hypothesis);
   }
   for (const Offer& offer : offers) {
     if (offer.values.size() > 0 && offer.gain > chosen.offer.gain - kNotDistinguished &&
@@ -168,7 +180,7 @@ const Candidate& simplest_of(const std::vector<GroundHypothesis>& catalogue,
     const bool part =
         frees_part_of(catalogue[c.offer.hypothesis], catalogue[simplest->offer.hypothesis]);
     const bool alike = (1 + kTraceShare) * c.offer.gain >= chosen.offer.gain;
-    if (part && alike && may_be_named(c.held_out_gain)) simplest = &c;
+    if (part && alike && c.may_be_named) simplest = &c;
   }
   return *simplest;
 }
@@ -180,7 +192,7 @@ const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
   const Candidate* likeliest = &chosen;
   for (const Candidate& c : candidates) {
     if (c.offer.gain < likeliest->offer.gain + kNotDistinguished) continue;
-    if (!may_be_named(c.held_out_gain) || c.moved != chosen.moved) continue;
+    if (!c.may_be_named || c.moved != chosen.moved) continue;
     const HeldOutGain over = held_out_gain(windows, chosen.held_out, c.held_out, work.seed);
     if (over.lo <= 0) likeliest = &c;
   }
@@ -212,14 +224,19 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   while (!tried.empty() && (tried.back().first.gain < least || tried.size() > kMostCandidates)) {
     tried.pop_back();
   }
+  const auto shown = [&](const Candidate& c) {
+    return shows_its_size(fitter, work, search->catalogue[c.offer.hypothesis], c.fit);
+  };
   std::vector<Candidate> candidates;
   for (auto& [offer, fit] : tried) {
-    candidates.push_back(predict_held_out(fitter, work, *search, offer, std::move(fit)));
+    Candidate& c =
+        candidates.emplace_back(predict_held_out(fitter, work, *search, offer, std::move(fit)));
+    c.may_be_named = may_be_named(c.held_out_gain) && shown(c);
   }
   // Held out, values that gain far less than others do with small moves of the rest do not compete.
   double most = 0;
   for (const Candidate& c : candidates) {
-    if (may_be_named(c.held_out_gain)) most = std::max(most, c.offer.gain);
+    if (c.may_be_named) most = std::max(most, c.offer.gain);
   }
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
     return a.held_out_gain.mean > b.held_out_gain.mean;
@@ -228,13 +245,14 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   const bool further = !search->steps.empty();
   const auto chosen = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) {
     if (further && !(c.held_out_gain.hi > kToleratedGap)) return false;
-    return may_be_named(c.held_out_gain) && c.offer.gain >= kShareOfBest * most &&
+    return c.may_be_named && c.offer.gain >= kShareOfBest * most &&
            may_be_named(gain_beyond_traces(fitter.windows(), work, *search, c));
   });
   if (chosen == candidates.end()) {
-    if (!candidates.empty()) {
-      Candidate& best = candidates.front();
-      keep_if_best(search, std::move(best.held_out), search->catalogue[best.offer.hypothesis].name);
+    const auto best = std::ranges::find_if(candidates, shown);
+    if (best != candidates.end()) {
+      keep_if_best(search, std::move(best->held_out),
+                   search->catalogue[best->offer.hypothesis].name);
     }
     return false;
   }
