@@ -23,9 +23,10 @@ constexpr double kShares[] = {0.03, 0.06, 0.12, 0.22, 0.35, 0.5, 0.65, 0.78, 0.8
 // over what the places scatter by.
 constexpr double kMiddles[] = {0.08, 0.25, 0.42, 0.58, 0.75, 0.92};
 constexpr double kRadii[] = {0.35, 0.6, 1};
-constexpr double kLargest = 2;          // the same of one that may be named
-constexpr double kLeastInside = 0.015;  // of the wheels' places, and outside
-constexpr std::size_t kClimbed = 4;     // of the groups, each from its best
+constexpr double kLargest = 2;               // the same of one that may be named
+constexpr double kLeastInside = 0.015;       // of the wheels' places, and outside
+constexpr double kLeastPlaces = 3 * kFolds;  // so that each fold has some to be predicted
+constexpr std::size_t kClimbed = 4;          // of the groups, each from its best
 constexpr int kClimbingRounds = 6;
 
 using Eigen::Vector2d, Eigen::VectorXd;
@@ -108,8 +109,9 @@ bool parts(const std::vector<Vector2d>& places, const std::vector<FitRow>& rows,
   const Region region(rows, values);
   const auto there =
       std::ranges::count_if(places, [&](const Vector2d& place) { return region.has(place); });
-  const double share = static_cast<double>(there) / static_cast<double>(places.size());
-  return region.may_be(places) && std::min(share, 1 - share) > kLeastInside;
+  const auto all = static_cast<double>(places.size());
+  const double fewer = std::min(static_cast<double>(there), all - static_cast<double>(there));
+  return region.may_be(places) && fewer > std::max(kLeastInside * all, kLeastPlaces);
 }
 
 // Values of the best of some borders, the best of every group climbed from.  `rows` are those of
