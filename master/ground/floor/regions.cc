@@ -151,7 +151,8 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
   VectorXd best = values;
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < std::min(kClimbed, best_of_group.size()); ++k) {
-    const VectorXd& start = best_of_group[k].second;
+    const auto& [gain, start] = best_of_group[k];
+    if (!std::isfinite(gain)) break;
     // Nothing may draw a border away from there while both floors are one.
     std::vector<FitRow> from_there = rows;
     for (Eigen::Index r = fit.values.size(); r < ratio; ++r) {
