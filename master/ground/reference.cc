@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -10,7 +11,9 @@
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
+#include "master/ground/fit/held_out.h"
 #include "master/ground/fit/scans.h"
+#include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 #include "master/io/log_checks/run_checks.h"
 
@@ -57,13 +60,19 @@ double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, Eigen::Inde
 
 // What the robot's rows have no word for and the reference shows all the same (a battery that sags,
 // steering that is weaker to one side) is the robot's own: no change, where the other log has it
-// too. The best of the catalogue is taken into the fit as long as it is worth a name.
+// too. The best of the catalogue is taken into the fit as long as it is worth a name, which
+// stretches that were not fitted bear out; what is of the world may be gone in the other log, and
+// is taken along where it is more than is tolerated.
 WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypothesis>& catalogue,
-                      WindowFit fit) {
+                      std::uint64_t seed, WindowFit fit) {
   for (int found = 0; found < kMostTraits; ++found) {
     const std::vector<Eigen::MatrixXd> slopes = fitter.slopes(fit);
-    WindowFit best = fit;
-    double most = kLeastChangeGain;
+    struct Trait {
+      double gain = 0;
+      WindowFit with;
+      bool of_world = false;
+    };
+    std::vector<Trait> traits;
     for (const GroundHypothesis& h : catalogue) {
       Eigen::VectorXd values = fit.values;
       std::vector<FitRow> rows = with_freed(fit.rows, h, &values);
@@ -78,12 +87,18 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
       WindowFit with = fitter.fit(rows, {}, values);
       const double gain = gain_of(fitter, h, with, fit);
       const bool less = with.values[values.size() - 1] < rows.back().row.nominal;
-      if (gain < most || (h.only_more && less)) continue;
-      most = gain;
-      best = std::move(with);
+      if (gain < kLeastChangeGain || (h.only_more && less)) continue;
+      traits.push_back({gain, std::move(with), h.of_world});
     }
-    if (best.rows.size() == fit.rows.size()) break;
-    fit = std::move(best);
+    std::ranges::stable_sort(traits, std::greater(), &Trait::gain);
+    const WindowFit before = fit_held_out(fitter, fit.rows, fit.values);
+    const auto shown = std::ranges::find_if(traits, [&](const Trait& trait) {
+      const WindowFit after = fit_held_out(fitter, trait.with.rows, trait.with.values);
+      const HeldOutGain gain = held_out_gain(fitter.windows(), after, before, seed);
+      return may_be_named(gain) && !(trait.of_world && gain.mean < kToleratedGap);
+    });
+    if (shown == traits.end()) break;
+    fit = std::move(shown->with);
   }
   return fit;
 }
@@ -291,7 +306,8 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   if (const GroundHypothesis* h = fault_of(robot, reference, settings, question, fitter, fit)) {
     return Error{"the log that values are fitted to is wrong in " + h->thing + ". " + h->remedy};
   }
-  fit = with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), std::move(fit));
+  fit =
+      with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), seed, std::move(fit));
   question.reference = reference_of(fitter, fit, seed, alone);
   for (std::size_t k = 0; k < question.rows.size(); ++k) {
     question.rows[k].nominal = fit.values[k];
