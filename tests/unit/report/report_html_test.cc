@@ -66,7 +66,7 @@ TEST(GapSplit, WhatGetsWorseIsDrawnLonger) {
   };
   EXPECT_NEAR(drawn("after"), 100, 0.1);
   EXPECT_NEAR(drawn("before"), 100 * 59.7 / 83.7, 0.1);
-  EXPECT_THAT(html, HasSubstr("part-worse"));
+  EXPECT_THAT(html, HasSubstr("#hatch-worse"));
   EXPECT_THAT(html, HasSubstr("▲ worse"));
 }
 
