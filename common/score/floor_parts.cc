@@ -18,22 +18,35 @@ double ratio_beyond(double ratio, double beyond_m) {
 }  // namespace
 
 void FloorParts::put(std::string_view name, double value) {
-  if (name == "edge_angle") edge_rad_ = value;
-  if (name == "edge_offset") edge_m_ = value;
-  if (name == "edge_ratio") edge_ratio_ = value;
-  if (name == "patch_x") patch_m_[0] = value;
-  if (name == "patch_y") patch_m_[1] = value;
-  if (name == "patch_radius") patch_radius_m_ = value;
-  if (name == "patch_ratio") patch_ratio_ = value;
+  const bool known = name.starts_with(kKnown);
+  if (known) name.remove_prefix(kKnown.size());
+  Parts& p = known ? known_ : parts_;
+  if (name == "edge_angle") p.edge_rad = value;
+  if (name == "edge_offset") p.edge_m = value;
+  if (name == "edge_ratio") p.edge_ratio = value;
+  if (name == "patch_x") p.patch_m[0] = value;
+  if (name == "patch_y") p.patch_m[1] = value;
+  if (name == "patch_radius") p.patch_radius_m = value;
+  if (name == "patch_ratio") p.patch_ratio = value;
+}
+
+bool FloorParts::even() const {
+  return parts_.edge_ratio == 1 && parts_.patch_ratio == 1 && known_.edge_ratio == 1 &&
+         known_.patch_ratio == 1;
 }
 
 double FloorParts::under(const Pose* X_WR, const RobotWheel& wheel) const {
   if (X_WR == nullptr) return 1;
   const Pose at = *X_WR * Pose{wheel.x_m.value_or(0), wheel.y_m.value_or(0), 0};
   const Eigen::Vector2d place = Eigen::Vector2d(at.x, at.y) - origin_m_;
-  const Eigen::Vector2d normal(std::cos(edge_rad_), std::sin(edge_rad_));
-  return ratio_beyond(edge_ratio_, normal.dot(place) - edge_m_) *
-         ratio_beyond(patch_ratio_, patch_radius_m_ - (place - patch_m_).norm());
+  double ratio = 1;
+  for (const Parts* part : {&parts_, &known_}) {
+    const Parts& p = *part;
+    const Eigen::Vector2d normal(std::cos(p.edge_rad), std::sin(p.edge_rad));
+    ratio *= ratio_beyond(p.edge_ratio, normal.dot(place) - p.edge_m) *
+             ratio_beyond(p.patch_ratio, p.patch_radius_m - (place - p.patch_m).norm());
+  }
+  return ratio;
 }
 
 double FloorParts::under_driven(const Pose* X_WR, const GroundRobot& robot) const {

@@ -12,6 +12,9 @@ namespace gapfarm {
 // Ratios are of how far a wheel travels there.
 class FloorParts {
  public:
+  // Before a value's name: of a floor that is known to be so, whatever else there is.
+  static constexpr std::string_view kKnown = "known_";
+
   // Places are counted from `origin_m` of the world.
   explicit FloorParts(const Eigen::Vector2d& origin_m) : origin_m_(origin_m) {}
 
@@ -19,17 +22,20 @@ class FloorParts {
   // its business.
   void put(std::string_view name, double value);
 
-  bool even() const { return edge_ratio_ == 1 && patch_ratio_ == 1; }
+  bool even() const;
   // Under a wheel of a robot that stands there; 1 where nobody knows where that is.
   double under(const Pose* X_WR, const RobotWheel& wheel) const;
   // The mean of the driven wheels.
   double under_driven(const Pose* X_WR, const GroundRobot& robot) const;
 
  private:
+  struct Parts {
+    double edge_rad = 0, edge_m = 0, edge_ratio = 1;
+    Eigen::Vector2d patch_m = Eigen::Vector2d::Zero();
+    double patch_radius_m = 0, patch_ratio = 1;
+  };
   Eigen::Vector2d origin_m_;
-  double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
-  Eigen::Vector2d patch_m_ = Eigen::Vector2d::Zero();
-  double patch_radius_m_ = 0, patch_ratio_ = 1;
+  Parts parts_, known_;
 };
 
 }  // namespace gapfarm

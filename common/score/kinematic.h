@@ -58,7 +58,8 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // them); "edge_angle" (rad), "edge_offset" (m) and "edge_ratio": two floors.  Beyond the line of
 // points p with p (cos angle, sin angle) = offset, from the origin along the tracker's axes, a
 // wheel travels ratio times as far, of omni and mecanum wheels with that of the traction;
-// "patch_x", "_y", "_radius" (m) and "patch_ratio": the same within a circle; "downhill_x" and "_y"
+// "patch_x", "_y", "_radius" (m) and "patch_ratio": the same within a circle; "known_" before these
+// names: of a second edge and circle; "downhill_x" and "_y"
 // (of the tracker's frame): how much farther than its wheels' way a robot goes downhill, over how
 // far they roll; of robots that skid over how far turns drag their wheels.
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,

@@ -11,6 +11,7 @@
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
+#include "common/score/floor_parts.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/fit/scans.h"
 #include "master/ground/report/ground_text.h"
@@ -67,12 +68,7 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
                       std::uint64_t seed, WindowFit fit) {
   for (int found = 0; found < kMostTraits; ++found) {
     const std::vector<Eigen::MatrixXd> slopes = fitter.slopes(fit);
-    struct Trait {
-      double gain = 0;
-      WindowFit with;
-      bool of_world = false;
-    };
-    std::vector<Trait> traits;
+    std::vector<std::pair<double, WindowFit>> traits;  // and what they gain
     for (const GroundHypothesis& h : catalogue) {
       Eigen::VectorXd values = fit.values;
       std::vector<FitRow> rows = with_freed(fit.rows, h, &values);
@@ -88,17 +84,16 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
       const double gain = gain_of(fitter, h, with, fit);
       const bool less = with.values[values.size() - 1] < rows.back().row.nominal;
       if (gain < kLeastChangeGain || (h.only_more && less)) continue;
-      traits.push_back({gain, std::move(with), h.of_world});
+      traits.emplace_back(gain, std::move(with));
     }
-    std::ranges::stable_sort(traits, std::greater(), &Trait::gain);
+    std::ranges::stable_sort(traits, std::greater(), &std::pair<double, WindowFit>::first);
     const WindowFit before = fit_held_out(fitter, fit.rows, fit.values);
-    const auto shown = std::ranges::find_if(traits, [&](const Trait& trait) {
-      const WindowFit after = fit_held_out(fitter, trait.with.rows, trait.with.values);
-      const HeldOutGain gain = held_out_gain(fitter.windows(), after, before, seed);
-      return may_be_named(gain) && !(trait.of_world && gain.mean < kToleratedGap);
+    const auto shown = std::ranges::find_if(traits, [&](const auto& trait) {
+      const WindowFit after = fit_held_out(fitter, trait.second.rows, trait.second.values);
+      return may_be_named(held_out_gain(fitter.windows(), after, before, seed));
     });
     if (shown == traits.end()) break;
-    fit = std::move(shown->with);
+    fit = std::move(shown->second);
   }
   return fit;
 }
@@ -227,7 +222,9 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
                              bool alone) {
   GroundReference reference;
   for (const FitRow& row : fit.rows) {
-    reference.names.push_back(row.row.name);
+    const bool place = row.row.name.starts_with("edge_") || row.row.name.starts_with("patch_");
+    // The other log may have an edge of its own beside this one.
+    reference.names.push_back((place ? std::string(FloorParts::kKnown) : "") + row.row.name);
     reference.units.push_back(row.row.unit);
   }
   reference.values = fit.values;

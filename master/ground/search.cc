@@ -70,15 +70,17 @@ struct Candidate {
   bool may_be_named = false;
 };
 
-// Whether the interval of what says how much of it there is, its first parameter, excludes none:
-// what a few windows at a border gain may be theirs alone.
-bool shows_its_size(const WindowFitter& fitter, const GroundWork& work,
-                    const GroundHypothesis& hypothesis, const WindowFit& fit) {
+// Whether the interval of what says how much of it there is, its first parameter, excludes none, or
+// what is kept: what a few windows at a border gain may be theirs alone.
+bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
+                    std::size_t index, const WindowFit& fit) {
+  const GroundHypothesis& hypothesis = search.catalogue[index];
   if (!hypothesis.describe) return true;
   NamedEffect effect;
   hypothesis.describe(fitter, fit, work.seed, &effect);
   const Estimate& size = effect.parameters.front();
-  return size.lo > 0 || size.hi < 0;
+  const double kept = search.reference ? hypothesis.kept : 0;
+  return size.lo > kept || size.hi < -kept;
 }
 
 Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
@@ -225,7 +227,7 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     tried.pop_back();
   }
   const auto shown = [&](const Candidate& c) {
-    return shows_its_size(fitter, work, search->catalogue[c.offer.hypothesis], c.fit);
+    return shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit);
   };
   std::vector<Candidate> candidates;
   for (auto& [offer, fit] : tried) {

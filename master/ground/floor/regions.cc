@@ -271,7 +271,6 @@ void describe_friction_patch(const WindowFitter& fitter, const WindowFit& fit, s
       text(e[2]));
 }
 
-// `price`: of its values.
 GroundHypothesis region(const char* name, const char* alias, const char* thing,
                         std::vector<KinematicRow> freed) {
   GroundHypothesis hypothesis;
@@ -281,6 +280,7 @@ GroundHypothesis region(const char* name, const char* alias, const char* thing,
   hypothesis.price = kPriceOfAValue * (static_cast<double>(freed.size()) - 1) + kPriceOfLooking;
   hypothesis.freed = std::move(freed);
   hypothesis.of_world = true;
+  hypothesis.kept = kKeptFloorShare;
   return hypothesis;
 }
 
