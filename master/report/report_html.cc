@@ -58,7 +58,7 @@ std::string shape_section(const Diagnosis& diagnosis) {
     html += plot_grid("shape");
   }
   if (diagnosis.residual && diagnosis.residual->correction.outliers) {
-    html += R"(<div class="grid" id="stray-plots"></div>)" + std::string(kNoScript);
+    html += R"(<div class="grid" id="outlier-plots"></div>)" + std::string(kNoScript);
   }
   if (!diagnosis.nearest.empty()) {
     html += "<h3>What comes nearest, and why it is not the cause</h3>" +

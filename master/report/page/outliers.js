@@ -31,7 +31,7 @@ function outlierTimes(drives) {
 }
 
 function startOutliers(trials) {
-  const parent = document.getElementById("stray-plots");
+  const parent = document.getElementById("outlier-plots");
   if (!parent) return;
   const { chances } = PAGE.residual.strays;
   const drives = trials.map((trial, i) => ({ ...floorTrial(trial), chance: chances[i] })).filter((d) => isNumber(d.chance));

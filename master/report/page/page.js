@@ -102,7 +102,7 @@ if (pageTrials.length) {
   startPoses(pageTrials);
   startResiduals(pageTrials, PAGE.where || []);
 } else {
-  for (const id of ["floor-plot", "stray-plots", "drive-plots", "pose-plots", "residual-plots"]) {
+  for (const id of ["floor-plot", "outlier-plots", "drive-plots", "pose-plots", "residual-plots"]) {
     const place = document.getElementById(id);
     if (place) place.textContent = PAGE.without_trials;
   }
