@@ -1,15 +1,20 @@
 // Numbers as people read them.
 #pragma once
 
+#include <charconv>
 #include <cmath>
 
 namespace gapfarm {
 
-// `value` to so many significant digits, so that small values do not vanish.
+// The number that `value` is when it is written with so many significant digits: small values do
+// not vanish, and its shortest text is no longer.  0 digits: as it is.
 inline double rounded_to_digits(double value, int digits) {
-  if (value == 0 || !std::isfinite(value)) return value;
-  const double unit = std::pow(10.0, digits - 1 - std::floor(std::log10(std::abs(value))));
-  return std::round(value * unit) / unit;
+  if (digits <= 0 || !std::isfinite(value)) return value;
+  char text[64];
+  const auto end =
+      std::to_chars(text, text + sizeof text, value, std::chars_format::scientific, digits - 1);
+  std::from_chars(text, end.ptr, value);
+  return value;
 }
 
 }  // namespace gapfarm

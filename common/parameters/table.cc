@@ -7,6 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/math/digits.h"
 #include "common/parameters/external.h"
 #include "common/parameters/ground.h"
 #include "common/parameters/push.h"
@@ -22,14 +23,8 @@ std::string number(double value) {
   return {text, end};
 }
 
-double rounded(double value) {
-  constexpr int kDigits = 4;  // more than any of these parameters is known to
-  char text[32];
-  const auto end =
-      std::to_chars(text, text + sizeof text, value, std::chars_format::scientific, kDigits - 1);
-  std::from_chars(text, end.ptr, value);
-  return value;
-}
+// More digits than any of these parameters is known to.
+double rounded(double value) { return rounded_to_digits(value, 4); }
 
 using enum ParameterKind;
 using enum ParameterScale;

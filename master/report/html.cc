@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <span>
 #include <utility>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/math/digits.h"
 
 namespace gapfarm {
 namespace {
@@ -63,7 +63,7 @@ std::string script_safe(std::string_view json) { return escaped(json, kInScript)
 std::string number_text(double value, int digits) {
   if (!std::isfinite(value)) return kDash;
   double size = std::abs(value);
-  if (size < 1000) size = as_written(size, digits);
+  if (size < 1000) size = rounded_to_digits(size, digits);
   std::string text = "0";
   if (size >= 1000 && size < 1e15) {
     text = fmt::format("{:.0f}", size);
@@ -80,10 +80,6 @@ std::string number_text(double value, int digits) {
     }
   }
   return (value < 0 && text != "0" ? kMinus : "") + text;
-}
-
-double as_written(double value, int digits) {
-  return std::strtod(fmt::format("{:.{}g}", value, digits).c_str(), nullptr);
 }
 
 std::string with_unit(std::string text, std::string_view unit, std::string_view between) {

@@ -20,10 +20,6 @@ inline constexpr int kPlotDigits = 7;
 // "0.412", "1,230", "−3.2": about three significant digits; "–" when not finite.
 std::string number_text(double value, int digits = 3);
 
-// The number that `value` is when it is written with so many significant digits: its text in a
-// page's data is no longer.
-double as_written(double value, int digits);
-
 // "0.28 m/s"; the text alone where there is no unit ("" or "-").
 std::string with_unit(std::string text, std::string_view unit, std::string_view between = " ");
 

@@ -1,13 +1,13 @@
 // Trials as a table, drives with their paths, and how the pictures describe both.
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
 #include "common/base/text.h"
 #include "common/json/json.h"
+#include "common/math/digits.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
 
@@ -63,11 +63,6 @@ DiagnosedTrial blank_trial() {
   return trial;
 }
 
-double rounded(double value, int digits) {
-  if (digits <= 0 || !std::isfinite(value)) return value;
-  return std::strtod(formatted("%.*g", digits, value).c_str(), nullptr);
-}
-
 // Whether `json` fits `field`; sets it when so.
 template <class Field>
 bool read_cell(const Json& json, Field& field) {
@@ -99,12 +94,12 @@ Json trials_json(const Diagnosis& diagnosis, int digits) {
     Json row = Json::array();
     visit_columns(trial, [&](const std::string&, const auto& field) {
       if constexpr (std::is_same_v<std::decay_t<decltype(field)>, double>) {
-        row.push_back(rounded(field, digits));
+        row.push_back(rounded_to_digits(field, digits));
       } else {
         row.push_back(field);
       }
     });
-    for (double value : trial.covariates) row.push_back(rounded(value, digits));
+    for (double value : trial.covariates) row.push_back(rounded_to_digits(value, digits));
     rows.push_back(std::move(row));
   }
   return {{"columns", std::move(columns)}, {"rows", std::move(rows)}};

@@ -6,6 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/json/json.h"
+#include "common/math/digits.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
 #include "master/report/glossary.h"
@@ -75,7 +76,7 @@ Json front_json(const RunReport& report) {
   }
   for (const auto& [generation, volume] :
        decimated(known, kMostVolumes, [](const auto& at) { return at.second; })) {
-    volumes.push_back({generation, as_written(volume, 7)});
+    volumes.push_back({generation, rounded_to_digits(volume, 7)});
   }
   return {{"objectives", std::move(objectives)},
           {"members", std::move(members)},
@@ -95,7 +96,7 @@ Json sample_json(const RunReport& report) {
                      {"importance", written(gene.importance, 3)}});
   }
   for (const StoredIndividual& one : report.sample.evaluated) {
-    evaluated.push_back({one.birth_id, as_written(*one.fitness, 6), written(one.genome, 3),
+    evaluated.push_back({one.birth_id, rounded_to_digits(*one.fitness, 6), written(one.genome, 3),
                          written_values(one.objectives, 5)});
   }
   return {{"genes", std::move(genes)}, {"evaluated", std::move(evaluated)}};

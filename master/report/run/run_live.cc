@@ -7,6 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/math/digits.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -68,11 +69,11 @@ std::string timeline_html(const RunTimeline& timeline) {
 }  // namespace
 
 Json written(const std::optional<double>& value, int digits) {
-  return value ? Json(as_written(*value, digits)) : Json(nullptr);
+  return value ? Json(rounded_to_digits(*value, digits)) : Json(nullptr);
 }
 
 Json written(const std::vector<double>& values, int digits) {
-  return mapped(values, [&](double value) { return as_written(value, digits); });
+  return mapped(values, [&](double value) { return rounded_to_digits(value, digits); });
 }
 
 Json written_values(const std::vector<NamedValue>& values, int digits) {
