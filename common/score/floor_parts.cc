@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace gapfarm {
 namespace {
@@ -17,17 +18,23 @@ double ratio_beyond(double ratio, double beyond_m) {
 
 }  // namespace
 
+const FloorParts::Row* FloorParts::find(std::string_view name) {
+  static constexpr Row kRows[] = {
+      {"edge_angle", &Parts::edge_rad},    {"edge_offset", &Parts::edge_m},
+      {"edge_ratio", &Parts::edge_ratio},  {"patch_x", &Parts::patch_x_m},
+      {"patch_y", &Parts::patch_y_m},      {"patch_radius", &Parts::patch_radius_m},
+      {"patch_ratio", &Parts::patch_ratio}};
+  const auto row = std::ranges::find(kRows, name, &Row::name);
+  return row == std::end(kRows) ? nullptr : row;
+}
+
+bool FloorParts::has(std::string_view name) { return find(name) != nullptr; }
+
 void FloorParts::put(std::string_view name, double value) {
   const bool known = name.starts_with(kKnown);
-  if (known) name.remove_prefix(kKnown.size());
-  Parts& p = known ? known_ : parts_;
-  if (name == "edge_angle") p.edge_rad = value;
-  if (name == "edge_offset") p.edge_m = value;
-  if (name == "edge_ratio") p.edge_ratio = value;
-  if (name == "patch_x") p.patch_m[0] = value;
-  if (name == "patch_y") p.patch_m[1] = value;
-  if (name == "patch_radius") p.patch_radius_m = value;
-  if (name == "patch_ratio") p.patch_ratio = value;
+  const Row* row = find(known ? name.substr(kKnown.size()) : name);
+  Parts& to = known ? known_ : parts_;  // GCC 12 makes a copy of it behind .*
+  if (row != nullptr) to.*row->value = value;
 }
 
 bool FloorParts::even() const {
@@ -44,7 +51,8 @@ double FloorParts::under(const Pose* X_WR, const RobotWheel& wheel) const {
     const Parts& p = *part;
     const Eigen::Vector2d normal(std::cos(p.edge_rad), std::sin(p.edge_rad));
     ratio *= ratio_beyond(p.edge_ratio, normal.dot(place) - p.edge_m) *
-             ratio_beyond(p.patch_ratio, p.patch_radius_m - (place - p.patch_m).norm());
+             ratio_beyond(p.patch_ratio, p.patch_radius_m - std::hypot(place[0] - p.patch_x_m,
+                                                                       place[1] - p.patch_y_m));
   }
   return ratio;
 }

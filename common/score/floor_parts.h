@@ -18,8 +18,9 @@ class FloorParts {
   // Places are counted from `origin_m` of the world.
   explicit FloorParts(const Eigen::Vector2d& origin_m) : origin_m_(origin_m) {}
 
-  // Takes a value of the kinematic model by its name (common/score/kinematic.h); others are none of
-  // its business.
+  // Whether a value of the kinematic model (common/score/kinematic.h) is one of these.
+  static bool has(std::string_view name);
+  // Takes it; others are none of its business.
   void put(std::string_view name, double value);
 
   bool even() const;
@@ -31,9 +32,14 @@ class FloorParts {
  private:
   struct Parts {
     double edge_rad = 0, edge_m = 0, edge_ratio = 1;
-    Eigen::Vector2d patch_m = Eigen::Vector2d::Zero();
-    double patch_radius_m = 0, patch_ratio = 1;
+    double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0, patch_ratio = 1;
   };
+  struct Row {
+    std::string_view name;
+    double Parts::*value;
+  };
+  static const Row* find(std::string_view name);
+
   Eigen::Vector2d origin_m_;
   Parts parts_, known_;
 };

@@ -222,9 +222,9 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
                              bool alone) {
   GroundReference reference;
   for (const FitRow& row : fit.rows) {
-    const bool place = row.row.name.starts_with("edge_") || row.row.name.starts_with("patch_");
     // The other log may have an edge of its own beside this one.
-    reference.names.push_back((place ? std::string(FloorParts::kKnown) : "") + row.row.name);
+    const bool known = FloorParts::has(row.row.name);
+    reference.names.push_back((known ? std::string(FloorParts::kKnown) : "") + row.row.name);
     reference.units.push_back(row.row.unit);
   }
   reference.values = fit.values;
