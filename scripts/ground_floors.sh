@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Diagnoses MuJoCo's ground robots on level floors, slopes, over edges and over patches
-# (tests/mujoco/ground_robot.cc):
+# Diagnoses ground robots of other simulators on level floors, slopes, over edges and over patches
+# (tests/mujoco/ground_robot.cc, tests/planar/ground_robot.cc):
 #   scripts/ground_floors.sh OUT BIN
 # Prints a row of a table a log: what was so, what was answered, and whether its intervals hold it.
 set -euo pipefail
@@ -10,14 +10,19 @@ mkdir -p "$out"
 echo '| robot | motors, N m s/rad | floor | truth | answered | in | beside it | verdict |'
 echo '|---|---|---|---|---|---|---|---|'
 seed=100
-for kind in differential skid tricycle; do
+for kind in differential skid tricycle omni mecanum car; do
+  case $kind in
+    differential | skid | tricycle) engine=mujoco ;;
+    *) engine=planar ;;
+  esac
   for stiffness in 0.2 1; do
+    if [[ $kind == car && $stiffness == 1 ]]; then continue; fi # a throttle holds no speed
     for floor in 'tilt 0' 'tilt 0.02' 'tilt 0.04' 'tilt 0.1' 'edge 0.003' 'edge 0.008' 'patch 0.003' 'patch 0.008'; do
       read -r what size <<< "$floor"
       seed=$((seed + 1))
       case=$out/${kind}_${stiffness}_${what}_$size
       rm -rf "$case"
-      "$bin/mujoco_ground_robot" "$kind" "$what" "$size" "$stiffness" "$seed" "$case"
+      "$bin/${engine}_ground_robot" "$kind" "$what" "$size" "$stiffness" "$seed" "$case"
       "$bin/gapfarm" diagnose "$case/config.toml" --out "$case/out" > "$case/out.txt" 2> "$case/log.txt"
       python3 - "$case" "$kind" "$stiffness" "$what" "$size" <<'PY'
 import json
@@ -48,6 +53,10 @@ if what == "tilt":
     floor, so = f"tilt {size} rad", f"{way:.0f} degrees"
     if p:
         answers = [degrees(p["direction"])]
+        if "angle" in p:
+            a = p["angle"]
+            answers.append((f"{a['value']:.3f} [{a['lo']:.3f}, {a['hi']:.3f}] rad",
+                            a["lo"] <= float(size) <= a["hi"]))
 elif what == "edge":
     floor = f"edge, {size} m"
     # The line that was answered, across the truth's.
