@@ -152,13 +152,16 @@ void RobotDrive::steer(double wanted_rad, double dt_s) {
   }
 }
 
-double RobotDrive::throttle(double commanded, double dt_s, double yaw_rate_rad_s) {
+double RobotDrive::throttle(double commanded, double dt_s, double yaw_rate_rad_s,
+                            const FloorForces& floor) {
   const RobotThrottle& t = robot_.throttle;
   const double v = throttle_m_s_;
   const double push = std::max(0.0, std::abs(commanded) - t.zero);
   const double decay = push * t.back_emf + t.drag + t.cornering * std::abs(yaw_rate_rad_s);
-  double next = (v + dt_s * std::copysign(push * t.gain, commanded)) / (1 + dt_s * decay);
-  const double held = t.coulomb * dt_s;  // dry friction stops, and does not turn round
+  const double drives = std::copysign(push * t.gain, commanded) + floor.downhill;
+  double next = (v + dt_s * drives) / (1 + dt_s * decay);
+  const double held = std::max(0.0, t.coulomb + floor.resists) *
+                      dt_s;  // dry friction stops, and does not turn round
   next = std::abs(next) <= held ? 0 : next - std::copysign(held, next);
   throttle_m_s_ = next;
   return (v + next) / 2;
@@ -208,14 +211,15 @@ std::span<const WheelMotion> RobotDrive::advance(double t_s, double dt_s, double
 }
 
 std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
-                                                        double yaw_rate_rad_s) {
+                                                        double yaw_rate_rad_s,
+                                                        const FloorForces& floor) {
   const std::vector<double>& commanded = track_.mean(t_s - robot_.motors.delay_s, dt_s);
   if (steered_) {
     double speed = 0;
     bool steered_traction = false;
     double wanted = angle_of(at(commanded, steering_));
     if (is_throttled(robot_)) {
-      speed = throttle(dead(at(commanded, throttle_)), dt_s, yaw_rate_rad_s);
+      speed = throttle(dead(at(commanded, throttle_)), dt_s, yaw_rate_rad_s, floor);
     } else if (robot_.command == CommandKind::kTwist) {
       const double v = at(commanded, v_);
       if (v != 0)

@@ -37,6 +37,12 @@ class CommandTrack {
   std::vector<double> mean_;
 };
 
+// What the floor does to what a throttle makes of its commands, m/s^2.
+struct FloorForces {
+  double downhill = 0;  // ahead, by the robot's weight
+  double resists = 0;   // more than the robot's own dry friction
+};
+
 class RobotDrive {
  public:
   // `robot` is complete and outlives this, as do the commands.  A throttle begins at `speed_m_s`,
@@ -47,7 +53,8 @@ class RobotDrive {
   // REQUIRES: steps that follow one another.
   std::span<const WheelMotion> advance(double t_s, double dt_s, double yaw_rate_rad_s);
   // The same without the wheels of a steered robot: its curvature() and traction_m_s() alone.
-  std::span<const WheelMotion> advance_motors(double t_s, double dt_s, double yaw_rate_rad_s);
+  std::span<const WheelMotion> advance_motors(double t_s, double dt_s, double yaw_rate_rad_s,
+                                              const FloorForces& floor = {});
 
   // Whether the wheels stand and are commanded to; and when the command differs.
   bool stands() const { return stands_; }
@@ -62,7 +69,7 @@ class RobotDrive {
   void wheel_targets(const std::vector<double>& commanded);
   void twist_targets(double v, double omega, double vy);
   void steer(double wanted_rad, double dt_s);
-  double throttle(double commanded, double dt_s, double yaw_rate_rad_s);
+  double throttle(double commanded, double dt_s, double yaw_rate_rad_s, const FloorForces& floor);
   void place_on_curve();
   double follow(std::size_t wheel, double target_m_s, double dt_s);
   double angle_of(double command) const;

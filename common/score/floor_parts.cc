@@ -57,14 +57,14 @@ double FloorParts::under(const Pose* X_WR, const RobotWheel& wheel) const {
   return ratio;
 }
 
-double FloorParts::under_driven(const Pose* X_WR, const GroundRobot& robot) const {
-  double sum = 0, driven = 0;
+double FloorParts::under_wheels(const Pose* X_WR, const GroundRobot& robot, bool driven) const {
+  double sum = 0, counted = 0;
   for (const RobotWheel& wheel : robot.wheels) {
-    if (!wheel.driven) continue;
+    if (driven && !wheel.driven) continue;
     sum += under(X_WR, wheel);
-    driven += 1;
+    counted += 1;
   }
-  return driven > 0 ? sum / driven : 1;
+  return counted > 0 ? sum / counted : 1;
 }
 
 }  // namespace gapfarm

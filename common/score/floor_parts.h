@@ -26,8 +26,8 @@ class FloorParts {
   bool even() const;
   // Under a wheel of a robot that stands there; 1 where nobody knows where that is.
   double under(const Pose* X_WR, const RobotWheel& wheel) const;
-  // The mean of the driven wheels.
-  double under_driven(const Pose* X_WR, const GroundRobot& robot) const;
+  // The mean of all wheels, or of the driven ones.
+  double under_wheels(const Pose* X_WR, const GroundRobot& robot, bool driven) const;
 
  private:
   struct Parts {

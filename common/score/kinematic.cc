@@ -101,6 +101,14 @@ class Body {
   // Whether it matters where the robot is and which way it heads.
   bool knows_place() const { return !floor_.even() || !downhill_.isZero(); }
 
+  // What a throttle has to overcome or is helped by; `X_WR`: where the robot is, if that matters.
+  FloorForces forces(const Pose* X_WR) const {
+    if (X_WR == nullptr || !is_throttled(robot_)) return {};
+    const double heading = X_WR->theta;
+    return {kGravity_m_s2 * (std::cos(heading) * downhill_[0] + std::sin(heading) * downhill_[1]),
+            kGravity_m_s2 * (1 - floor_.under_wheels(X_WR, robot_, false))};
+  }
+
   // `X_WR`: where the robot is, if that matters.
   Twist velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive,
                  const Pose* X_WR = nullptr) const {
@@ -111,8 +119,9 @@ class Body {
  private:
   Twist on_level(std::span<const WheelMotion> wheels, const RobotDrive& drive,
                  const Pose* X_WR) const {
+    if (is_throttled(robot_)) return on_floor(ahead_ * drive.traction_m_s(), drive.curvature());
     if (is_steered(robot_)) {
-      return on_floor(ahead_ * floor_.under_driven(X_WR, robot_) * drive.traction_m_s(),
+      return on_floor(ahead_ * floor_.under_wheels(X_WR, robot_, true) * drive.traction_m_s(),
                       drive.curvature());
     }
     if (is_holonomic(robot_)) {
@@ -212,6 +221,7 @@ class Body {
       const double dragged = std::abs(v[2]) * reach_m_;
       return {dragged * down[0], dragged * down[1], 0};
     }
+    if (is_throttled(robot_)) return Twist::Zero();  // forces()
     if (is_steered(robot_)) return {std::abs(v[0]) * down[0], 0, 0};
     double rolled = 0, driven = 0;
     for (std::size_t i = 0; i < wheels.size(); ++i) {
@@ -284,10 +294,11 @@ std::map<double, Pose> path(const Body& body, const CommandedRun& run, double be
     // A step ends where a pose is asked for: commands count by how long they lasted before it.
     while (t < asked) {
       const double dt = std::min(kStep_s, asked - t), end = std::min(t + kStep_s, asked);
-      const auto wheels = drive.advance_motors(t, dt, omega);
       const Pose X_WR =
           measured == nullptr ? Pose() : body.unobserved(measured->at(t + dt / 2)) * X_MR;
-      const Twist v = body.velocity(wheels, drive, measured != nullptr ? &X_WR : nullptr);
+      const Pose* there = measured == nullptr ? nullptr : &X_WR;
+      const auto wheels = drive.advance_motors(t, dt, omega, body.forces(there));
+      const Twist v = body.velocity(wheels, drive, there);
       omega = v[2];
       X = X * exp(Twist(dt * v));
       t = end;

@@ -57,11 +57,12 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // loaded wheels pull and drag more) with "load_x" and "load_y" (m: where the weight stands on
 // them); "edge_angle" (rad), "edge_offset" (m) and "edge_ratio": two floors.  Beyond the line of
 // points p with p (cos angle, sin angle) = offset, from the origin along the tracker's axes, a
-// wheel travels ratio times as far, of omni and mecanum wheels with that of the traction;
-// "patch_x", "_y", "_radius" (m) and "patch_ratio": the same within a circle; "known_" before these
-// names: of a second edge and circle; "downhill_x" and "_y"
-// (of the tracker's frame): how much farther than its wheels' way a robot goes downhill, over how
-// far they roll; of robots that skid over how far turns drag their wheels.
+// wheel travels ratio times as far, of omni and mecanum wheels with that of the traction, and a
+// throttle's resist rolling by 1 - ratio of the weight more; "patch_x", "_y", "_radius" (m) and
+// "patch_ratio": the same within a circle; "known_" before these names: of a second edge and
+// circle; "downhill_x" and "_y" (of the tracker's frame): how much farther than its wheels' way a
+// robot goes downhill, over how far they roll; of robots that skid over how far turns drag their
+// wheels; of a throttle the slope, sin(angle), by which gravity drives it.
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
                                  std::span<const Trial> trials, const Kinematics& kinematics);
 

@@ -26,6 +26,7 @@ constexpr double kRadii[] = {0.35, 0.6, 1};
 constexpr double kLargest = 2;               // the same of one that may be named
 constexpr double kLeastInside = 0.015;       // of the wheels' places, and outside
 constexpr double kLeastPlaces = 3 * kFolds;  // so that each fold has some to be predicted
+constexpr double kThrottleTried = 0.2;       // of the tried ratios: 5 % of the weight, a carpet
 constexpr std::size_t kClimbed = 4;          // of the groups, each from its best
 constexpr int kClimbingRounds = 6;
 
@@ -122,6 +123,7 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
                      const std::vector<Starts>& groups) {
   const std::vector<Vector2d> places = wheel_places(fitter);
   const Eigen::Index ratio = values.size() - 1;
+  const double differs = is_throttled(fitter.robot()) ? kThrottleTried : 1;
   // Where both floors are one, nothing depends on where the border is.
   WindowFit one = fit;
   one.rows.assign(rows.begin(), rows.end() - 1);
@@ -142,7 +144,7 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
       offer(fitter.promise(one, slopes, rows, start), start);
       // Windows over a border are outliers of one floor, so that slopes there promise too little.
       for (const double tried : Region::kTried) {
-        start[ratio] = tried;
+        start[ratio] = 1 + differs * (tried - 1);
         offer(fitter.hold(rows, start).objective - fit.objective, start);
       }
     }
@@ -210,8 +212,28 @@ VectorXd scan_circles(const WindowFitter& fitter, const WindowFit& fit,
   return best_region<Circle>(fitter, fit, rows, values, groups);
 }
 
-// How much less far wheels travel on the slower side, where the line passes nearest to the middle
-// of the log, and which side is slower.
+// By what two floors differ: how much less far wheels travel on the other one, or how much harder,
+// of its weight, it is for a throttle to roll the robot there.
+struct Differs {
+  bool throttled;
+
+  Estimate operator()(double ratio) const {
+    return throttled ? Estimate{"resistance", 1 - ratio, 0, 0, "-"}
+                     : Estimate{"ratio", ratio - 1, 0, 0, "-"};
+  }
+  std::string text(const Estimate& e) const {
+    const double sign = std::copysign(100, e.value), ends[] = {sign * e.lo, sign * e.hi};
+    const std::string share =
+        fmt::format("{:.{}f} % [{:.{}f}, {:.{}f}]", sign * e.value, throttled ? 1 : 0,
+                    std::min(ends[0], ends[1]), throttled ? 1 : 0, std::max(ends[0], ends[1]),
+                    throttled ? 1 : 0);
+    if (!throttled) return "travel " + share + (e.value < 0 ? " less far" : " farther");
+    return "resist rolling by " + share + " of the weight " + (e.value > 0 ? "more" : "less");
+  }
+};
+
+// How much slower the slower side is, where the line passes nearest to the middle of the log, and
+// which side that is.
 void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
                          NamedEffect* effect) {
   const Line line(fit.rows, fit.values);
@@ -220,12 +242,15 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
   const double sign = slower_beyond ? 1 : -1, turn = slower_beyond ? 0 : std::numbers::pi;
   const double angle = wrap_angle(line.angle + turn);
   const Vector2d middle = fitter.windows().origin_m;
+  const Differs differs{is_throttled(fitter.robot())};
   const std::vector<Estimate> found =
       derived_estimates(fitter, fit, seed, [&](const VectorXd& values) {
         const Line at(fit.rows, values);
         const double offset = at.offset - direction_of(at.angle).dot(middle - fitter.origin_m());
         return std::vector<Estimate>{
-            {"ratio", (slower_beyond ? at.ratio : 1 / at.ratio) - 1, 0, 0, "-"},
+            differs(slower_beyond       ? at.ratio
+                    : differs.throttled ? 2 - at.ratio
+                                        : 1 / at.ratio),
             {"offset", sign * offset, 0, 0, "m"},
             {"angle", angle + wrap_angle(at.angle + turn - angle), 0, 0, "rad"}};
       });
@@ -240,20 +265,20 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
   const Estimate y = place("y", middle[1], std::sin(angle));
   effect->parameters = {ratio, x, y, normal};
   effect->text = fmt::format(
-      "The robot drives over an edge between two floors: its wheels travel {:.0f} % [{:.0f}, "
-      "{:.0f}] less far beyond a line through x {:.3f} m [{:.3f}, {:.3f}], y {:.3f} m [{:.3f}, "
-      "{:.3f}] of the tracker's frame; the slower side lies towards {:.0f} degrees [{:.0f}, "
-      "{:.0f}] from its x axis.",
-      -100 * ratio.value, -100 * ratio.hi, -100 * ratio.lo, x.value, x.lo, x.hi, y.value, y.lo,
-      y.hi, normal.value / kDegree, normal.lo / kDegree, normal.hi / kDegree);
+      "The robot drives over an edge between two floors: its wheels {} beyond a line through x "
+      "{:.3f} m [{:.3f}, {:.3f}], y {:.3f} m [{:.3f}, {:.3f}] of the tracker's frame; the slower "
+      "side lies towards {:.0f} degrees [{:.0f}, {:.0f}] from its x axis.",
+      differs.text(ratio), x.value, x.lo, x.hi, y.value, y.lo, y.hi, normal.value / kDegree,
+      normal.lo / kDegree, normal.hi / kDegree);
 }
 
 void describe_friction_patch(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
                              NamedEffect* effect) {
+  const Differs differs{is_throttled(fitter.robot())};
   effect->parameters = derived_estimates(fitter, fit, seed, [&](const VectorXd& values) {
     const Circle at(fit.rows, values);
     const Vector2d middle = fitter.origin_m() + at.middle;
-    return std::vector<Estimate>{{"ratio", at.ratio - 1, 0, 0, "-"},
+    return std::vector<Estimate>{differs(at.ratio),
                                  {"x", middle[0], 0, 0, "m"},
                                  {"y", middle[1], 0, 0, "m"},
                                  {"radius", at.radius, 0, 0, "m"}};
@@ -262,13 +287,11 @@ void describe_friction_patch(const WindowFitter& fitter, const WindowFit& fit, s
     return fmt::format("{:.3f} m [{:.3f}, {:.3f}]", e.value, e.lo, e.hi);
   };
   const std::vector<Estimate>& e = effect->parameters;
-  const bool less = e[0].value < 0;
   effect->text = fmt::format(
-      "The robot drives over a patch of another floor: its wheels travel {:.0f} % [{:.0f}, {:.0f}] "
-      "{} within {} of x {}, y {} of the tracker's frame.",
-      100 * std::abs(e[0].value), 100 * (less ? -e[0].hi : e[0].lo),
-      100 * (less ? -e[0].lo : e[0].hi), less ? "less far" : "farther", text(e[3]), text(e[1]),
-      text(e[2]));
+      "The robot drives over a patch of another floor: its wheels {} within {} of x {}, y {} of "
+      "the "
+      "tracker's frame.",
+      differs.text(e[0]), text(e[3]), text(e[1]), text(e[2]));
 }
 
 GroundHypothesis region(const char* name, const char* alias, const char* thing,

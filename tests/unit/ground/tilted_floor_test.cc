@@ -74,5 +74,47 @@ TEST(TiltedFloor, ALevelOneIsNot) {
   EXPECT_EQ(found.verdict, Verdict::kNone) << found.headline;
 }
 
+// What weighs on a throttle is no ratio of anything: it speeds up downhill while nobody drives.
+TEST(TiltedFloor, IsFeltByAThrottle) {
+  const GroundRobot car = *parse_robot(
+      "drive = \"ackermann\"\ncommands = [\"throttle\", \"steering\"]\nwheelbase = 0.3\n"
+      "wheel_separation = 0.2\nwheel_radius = 0.05\n[throttle]\ngain = 4\ndrag = 1\n",
+      "car.toml");
+  constexpr double kSlope = 0.04, kDownhill_rad = -1.9, kDt_s = 1e-3;
+  Stream stream({5, Purpose::kTest, 0, 0, 0});
+  RunLog log;
+  log.channels = car.channels;
+  for (int r = 0; r < 2; ++r) {
+    LoggedRun& run = log.runs.emplace_back();
+    run.run = std::to_string(r);
+    Pose X_WR;
+    double v = 0;
+    for (int k = 0; k < 15000; ++k) {
+      const double t = k * kDt_s;
+      if (k % 500 == 0) {
+        run.commands.push_back({t, {0.1 + 0.3 * stream.uniform(), 0.6 * stream.uniform() - 0.3}});
+      }
+      if (k % 100 == 0) {
+        run.poses.push_back({t,
+                             {X_WR.x + 1e-3 * stream.normal(), X_WR.y + 1e-3 * stream.normal(),
+                              wrap_angle(X_WR.theta + 2e-3 * stream.normal())}});
+      }
+      const std::vector<double>& commanded = run.commands.back().values;
+      const double weight = 9.81 * kSlope * std::cos(X_WR.theta - kDownhill_rad);
+      v += kDt_s * (4 * commanded[0] - v + weight);
+      X_WR = X_WR * exp(Twist(kDt_s * v, 0, kDt_s * v * std::tan(commanded[1]) / 0.3));
+    }
+  }
+  const auto result = diagnose_ground(car, log, {});
+  ASSERT_TRUE(result) << result.error().message;
+  const Diagnosis& found = result->diagnosis;
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  EXPECT_EQ(found.effects[0].name, "floor_tilt") << found.headline;
+  const Estimate &angle = found.effects[0].parameters[0], &way = found.effects[0].parameters[1];
+  EXPECT_EQ(angle.key, "angle");
+  EXPECT_NEAR(angle.value, kSlope, 0.003);
+  EXPECT_NEAR(wrap_angle(way.value - kDownhill_rad), 0, 0.1);
+}
+
 }  // namespace
 }  // namespace gapfarm
