@@ -9,6 +9,7 @@
 #include "common/math/statistics.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/report/ground_text.h"
+#include "master/ground/stands.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -70,37 +71,15 @@ struct Candidate {
   bool may_be_named = false;
 };
 
-// Whether the interval of what says how much of it there is, its first parameter, excludes none, or
-// what is kept: what a few windows at a border gain may be theirs alone.
-bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
-                    std::size_t index, const WindowFit& fit) {
-  const GroundHypothesis& hypothesis = search.catalogue[index];
-  if (!hypothesis.describe) return true;
-  NamedEffect effect;
-  hypothesis.describe(fitter, fit, work.seed, &effect);
-  const Estimate& size = effect.parameters.front();
-  const double kept = search.reference ? hypothesis.kept : 0;
-  return size.lo > kept || size.hi < -kept;
-}
-
 Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
                            const GroundSearch& search, const Offer& offer, WindowFit fit) {
   std::vector<std::size_t> hypotheses = mapped(search.steps, &GroundStep::chosen);
   hypotheses.push_back(offer.hypothesis);
-  std::vector<FitRow> rows;
-  Eigen::VectorXd start;
-  for (const std::size_t h : hypotheses) {
-    rows = with_freed(std::move(rows), search.catalogue[h], &start);
-  }
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Eigen::Index j = row_index(fit.rows, rows[i].row.name);
-    if (j >= 0) start[i] = fit.values[j];
-  }
   const WindowSet& windows = fitter.windows();
   Candidate candidate{offer, std::move(fit), {}, search.chain.back(), {}, search.moved};
   const auto measure = [&](Candidate& c) {
     c.held_out = c.moved ? fit_held_out(fitter, c.fit.rows, c.fit.values)
-                         : fit_held_out(fitter, rows, start);
+                         : held_out_with(fitter, search, hypotheses, c.fit);
     c.held_out_gain = held_out_gain(windows, c.held_out, c.before, work.seed);
   };
   measure(candidate);
@@ -326,8 +305,10 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   const WindowFitter fitter(robot, search.windows, search.reference, work.memo);
   stage(kCatalogueStage);
   search.chain.push_back(fit_held_out(fitter, {}, {}));
+  const GroundNames unnamed = search;
   while (search.steps.size() < kMostSteps && take_step(fitter, work, &search)) {
   }
+  if (!(work.stopped && work.stopped())) drop_again(fitter, work, unnamed, &search);
   if (work.stopped && work.stopped()) return stopped;
   emit_steps(work, search);
   stage(kRestStage);

@@ -86,22 +86,26 @@ struct GroundWork {
   std::uint64_t seed = 1;         // of the draws behind intervals
 };
 
-struct GroundSearch : GroundBasis {
+// What is named by now.
+struct GroundNames {
+  std::vector<std::vector<Offer>> offers;  // of each step, best first
+  std::vector<GroundStep> steps;
+  std::vector<FitRow> rows;  // the file's with those chosen freed
+  WindowFit fit;
+  // Predictions of stretches that were held out: the file as it is, with the first thing that was
+  // chosen, with the first two, ...
+  std::vector<WindowFit> chain;
+  bool moved = false;  // the last of the chain: with all other values moved within tolerances
+};
+
+struct GroundSearch : GroundBasis, GroundNames {
   std::optional<WheelLoop> loop;  // where speeds were measured beside commands
   PoseGrid grid;                  // that the poses are rounded to
   StaleFrames stale;              // taken out of `log`
   RunChecks jumps;                // the same
   RunLog log;
-  WindowSet windows;                       // of that log
-  std::vector<std::vector<Offer>> offers;  // of each step, best first
-  std::vector<GroundStep> steps;
-  std::vector<FitRow> rows;  // the file's with those chosen freed
-  WindowFit fit;
+  WindowSet windows;   // of that log
   WindowFit free_fit;  // every row free
-  // Predictions of stretches that were held out: the file as it is, with the first thing that was
-  // chosen, with the first two, ...
-  std::vector<WindowFit> chain;
-  bool moved = false;  // the last of the chain: with all other values moved within tolerances
   // The best such prediction of all that was tried: the chain's last, values within their
   // tolerances, the best of the catalogue that was not named, every value free.  `closable`: what
   // it gains over the chain's last; of a change, over values within what a robot changes by.
