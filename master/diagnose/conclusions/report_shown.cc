@@ -116,12 +116,9 @@ std::vector<ShownDrive> drives_to_show(const std::vector<DiagnosedTrial>& trials
 
 // Residuals, ends and their covariances, seen from axes turned by `angle_rad`.
 void turn(double angle_rad, DiagnosedTrial* trial) {
-  const auto turned = [&](const Eigen::Vector3d& v) {
-    const Pose seen = Pose{0, 0, -angle_rad} * Pose{v[0], v[1], 0};
-    return Eigen::Vector3d(seen.x, seen.y, v[2]);
-  };
-  trial->tuned_residual = turned(trial->tuned_residual);
-  trial->final_residual = turned(trial->final_residual);
+  const Eigen::Matrix3d rotation = rotation_about_z(-angle_rad);
+  trial->tuned_residual = rotation * trial->tuned_residual;
+  trial->final_residual = rotation * trial->final_residual;
   trial->tuned_cov = rotate_covariance(trial->tuned_cov, -angle_rad);
   trial->final_cov = rotate_covariance(trial->final_cov, -angle_rad);
   for (Pose* end : {&trial->measured, &trial->tuned, &trial->final_}) {
@@ -137,14 +134,7 @@ std::vector<v1::Override> without_chance(const DiagnosisRequest& of, ParameterVa
     values[noise.row] = table[noise.row].lower;
   }
   table.without_chance(&values);
-  std::vector<v1::Override> overrides;
-  for (std::size_t row = 0; row < values.size(); ++row) {
-    if (values[row] == of.problem.values[row]) continue;
-    v1::Override& to = overrides.emplace_back();
-    to.set_parameter(static_cast<std::uint32_t>(row));
-    to.set_value(values[row]);
-  }
-  return overrides;
+  return overrides_of(of.problem.values, values);
 }
 
 // Rows of the table that are reported: noise, base, and named effects.

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "master/diagnose/fit/free_commands.h"
+#include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/fit/slopes.h"
 
 namespace gapfarm {
@@ -57,17 +58,14 @@ class BlockBuilder {
   // predicted end; a heading shift of the start turns the whole prediction.
   CovariateBlock readings() const {
     using Field = std::function<double(const Pose&)>;
-    double mx = 0, my = 0;
-    for (const ResidualTrial& t : study_.trials) {
-      mx += t.X_WS.x / static_cast<double>(study_.size());
-      my += t.X_WS.y / static_cast<double>(study_.size());
-    }
+    const Eigen::Vector2d middle = middle_of(study_);
     std::vector<Field> fields;
     for (int i = 0; i <= 3; ++i) {
       for (int j = 0; i + j <= 3; ++j) {
         if (i + j == 0) continue;
-        fields.push_back(
-            [=](const Pose& X) { return std::pow(X.x - mx, i) * std::pow(X.y - my, j); });
+        fields.push_back([=](const Pose& X) {
+          return std::pow(X.x - middle.x(), i) * std::pow(X.y - middle.y(), j);
+        });
       }
     }
     for (int h = 1; h <= 3; ++h) {
@@ -89,18 +87,14 @@ class BlockBuilder {
       const ResidualTrial& t = study_.trials[i];
       const double start = field(t.X_WS);
       const double end = field(t.X_WP);
-      const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
+      const Eigen::Matrix3d to_end = rotation_about_z(-t.X_WP.theta);
       if (component == 2) {
-        // The motion seen from the end's axes, turned by a quarter.
-        const Eigen::Vector2d m(t.X_WP.x - t.X_WS.x, t.X_WP.y - t.X_WS.y);
-        const Eigen::Vector2d turned(-m.y(), m.x());
-        d[i] = {start * (c * turned.x() + s * turned.y()),
-                start * (-s * turned.x() + c * turned.y()), start};
-        d[i] = -d[i];
-        d[i][2] += end;
+        // The motion, turned by a quarter.
+        const Eigen::Vector3d turned =
+            to_end * Eigen::Vector3d(t.X_WS.y - t.X_WP.y, t.X_WP.x - t.X_WS.x, 1);
+        d[i] = end * Eigen::Vector3d::UnitZ() - start * turned;
       } else {
-        const Eigen::Vector2d shift = (end - start) * Eigen::Vector2d::Unit(component);
-        d[i] = {c * shift.x() + s * shift.y(), -s * shift.x() + c * shift.y(), 0};
+        d[i] = to_end * ((end - start) * Eigen::Vector3d::Unit(component));
       }
     }
     return d;
@@ -148,17 +142,16 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
         scaled([=](const ResidualTrial& t) { return std::sin(h * t.X_WS.theta); })};
   };
   const std::vector<Values> commands = drive_classes(study);
-  double longest_s = 1, mx = 0, my = 0;
+  double longest_s = 1;
   for (const ResidualTrial& t : study.trials) {
     longest_s = std::max(longest_s, t.context.session_time_s);
-    mx += t.X_WS.x / static_cast<double>(study.size());
-    my += t.X_WS.y / static_cast<double>(study.size());
   }
+  const Eigen::Vector2d middle = middle_of(study);
   const auto time = [=](const ResidualTrial& t) {
     return t.context.session_time_s / longest_s - 0.5;
   };
-  const auto x = [=](const ResidualTrial& t) { return t.X_WS.x - mx; };
-  const auto y = [=](const ResidualTrial& t) { return t.X_WS.y - my; };
+  const auto x = [=](const ResidualTrial& t) { return t.X_WS.x - middle.x(); };
+  const auto y = [=](const ResidualTrial& t) { return t.X_WS.y - middle.y(); };
   const auto reversed = [&](bool left) {
     return b.values([=, &b](const ResidualTrial& t) {
       const int last = left ? t.context.last_left : t.context.last_right;

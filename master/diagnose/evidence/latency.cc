@@ -123,16 +123,12 @@ class PathFit {
       const PathSample& sample = logged.path[static_cast<std::size_t>(k)];
       const Pose predicted = at_time(without, sample.t_s);
       const Pose delayed = at_time(with, sample.t_s);
-      // The start reading's error, carried to here.
-      const double c = std::cos(predicted.theta), s = std::sin(predicted.theta);
-      Eigen::Matrix3d carried;
-      carried << c, s, s * predicted.x - c * predicted.y, -s, c, c * predicted.x + s * predicted.y,
-          0, 0, 1;
       const double share =
           (std::hypot(predicted.x, predicted.y) + 0.05 * std::abs(predicted.theta)) /
           std::max(whole, 1e-9);
       Eigen::Matrix<double, 3, 5> own;
-      own << carried, share * known.left, share * known.right;
+      // The start reading's error and the sides' gains, carried to here.
+      own << carry(predicted), share * known.left, share * known.right;
       Eigen::Matrix<double, 3, 2> here;
       here << local_difference(predicted, delayed) / tau_s,
           local_difference(predicted, between(known.X_WS, sample.pose));

@@ -203,9 +203,7 @@ CarriedToEnd carried_to_end(const Study& study, std::size_t trial) {
     rest += step / 2;
   }
   carried.rate(2, 2) = 1;
-  const Pose X_SE = between(t.X_WS, t.X_WP);
-  const double c = std::cos(X_SE.theta), s = std::sin(X_SE.theta);
-  carried.start << c, s, s * X_SE.x - c * X_SE.y, -s, c, c * X_SE.x + s * X_SE.y, 0, 0, 1;
+  carried.start = carry(between(t.X_WS, t.X_WP));
   return carried;
 }
 

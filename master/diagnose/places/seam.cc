@@ -104,9 +104,7 @@ Signature seam_signature(const Study& study, int axis, double position_m) {
       for (std::size_t i = 0; i < d.size(); ++i) {
         const ResidualTrial& t = study.trials[i];
         const double jump = shift(t.X_WP) - shift(t.X_WS);
-        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
-        d[i] = component == 0 ? Eigen::Vector3d(c * jump, -s * jump, 0)
-                              : Eigen::Vector3d(s * jump, c * jump, 0);
+        d[i] = rotation_about_z(-t.X_WP.theta).col(component) * jump;
       }
       seam.columns.col(column++) = study.whiten(d);
     }
@@ -127,9 +125,7 @@ Signature linear_view_signature(const Study& study) {
       std::vector<Eigen::Vector3d> d;
       for (const ResidualTrial& t : study.trials) {
         const double moved = seen == 0 ? t.X_WP.x - t.X_WS.x : t.X_WP.y - t.X_WS.y;
-        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
-        d.push_back(shown == 0 ? Eigen::Vector3d(c * moved, -s * moved, 0)
-                               : Eigen::Vector3d(s * moved, c * moved, 0));
+        d.push_back(rotation_about_z(-t.X_WP.theta).col(shown) * moved);
       }
       view.columns.col(2 * shown + seen) = study.whiten(d);
     }

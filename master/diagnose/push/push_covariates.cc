@@ -77,9 +77,7 @@ CovariateBlock readings(const Study& study) {
       for (int k = 0; k < 2; ++k) {
         std::vector<Eigen::Vector3d> d;
         for (const ResidualTrial& t : study.trials) {
-          const Pose end =
-              Pose{0, 0, -t.X_WP.theta} * Pose{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, 0};
-          d.push_back(field(t.X_WP) * Eigen::Vector3d(end.x, end.y, 0) -
+          d.push_back(field(t.X_WP) * rotation_about_z(-t.X_WP.theta).col(k) -
                       field(t.X_WS) * t.spread.start.col(k));
         }
         columns.push_back(study.whiten(d));

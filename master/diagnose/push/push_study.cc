@@ -84,10 +84,8 @@ void set_ends(const std::vector<Pose>& ends, Study* study) {
     const Eigen::Vector2d slid = transform(t.X_WP, t.push.p_RC) - transform(t.X_WS, t.push.p_RC);
     t.spread.slid_m = slid.norm();
     // Half of the whole motion each, along and across the push.
-    const double c = std::cos(t.push.direction_rad), s = std::sin(t.push.direction_rad);
-    const Eigen::Vector3d motion(c * slid.x() + s * slid.y(), -s * slid.x() + c * slid.y(),
-                                 wrap_angle(t.X_WP.theta - t.X_WS.theta));
-    t.left = t.right = motion / 2;
+    const Eigen::Vector3d motion(slid.x(), slid.y(), wrap_angle(t.X_WP.theta - t.X_WS.theta));
+    t.left = t.right = rotation_about_z(-t.push.direction_rad) * motion / 2;
   }
 }
 
@@ -240,9 +238,7 @@ Status start_from_grid(Predictor& predictor, Study* study) {
 }  // namespace
 
 Eigen::Vector3d from_push_axes(const ResidualTrial& trial, const Eigen::Vector3d& shift) {
-  const Pose end =
-      Pose{0, 0, trial.push.direction_rad - trial.X_WP.theta} * Pose{shift[0], shift[1], 0};
-  return {end.x, end.y, shift[2]};
+  return rotation_about_z(trial.push.direction_rad - trial.X_WP.theta) * shift;
 }
 
 Eigen::Matrix3d push_covariance(const ResidualTrial& trial, const NoiseEstimate& noise) {

@@ -119,8 +119,7 @@ std::vector<Where> push_where(const Study& study, std::span<const Eigen::Vector3
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& t = study.trials[i];
     const double turn_rad = t.X_WP.theta - t.push.direction_rad;
-    const Pose along = Pose{0, 0, turn_rad} * Pose{residuals[i][0], residuals[i][1], 0};
-    along_push.emplace_back(along.x, along.y, residuals[i][2]);
+    along_push.push_back(rotation_about_z(turn_rad) * residuals[i]);
     covariances[i] = rotate_covariance(covariances[i], turn_rad);
   }
   WhereOptions options;
