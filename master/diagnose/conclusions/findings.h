@@ -74,12 +74,6 @@ std::string alias_sentence(const std::string& effect, const std::vector<std::str
 std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                                   std::span<const Cell> cells, const TrialLog& log);
 
-struct Leftover {
-  std::string covariate;
-  double log10_p = 0;
-  double excess = 0;  // nats over all trials beyond what chance explains
-};
-
 // Variance of what is left over the noise's, the degrees of freedom that were spent given back:
 // robust, and bounded since the noise was measured.
 double leftover_scale(const Regression& explained);

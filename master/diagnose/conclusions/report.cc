@@ -57,13 +57,7 @@ void fill_judgement(const Judgement& judged, Diagnosis* d) {
   d->cautions = judged.cautions;
   d->nearest = judged.nearest;
   d->sanity.insert(d->sanity.begin(), judged.warnings.begin(), judged.warnings.end());
-  for (const Leftover& l : judged.left) d->checks.push_back({l.covariate, l.log10_p, l.excess});
-}
-
-void fill_steps(const Screening& screening, Diagnosis* d) {
-  for (const SelectionStep& step : screening.steps) {
-    d->steps.push_back({step.explained, step.offered});
-  }
+  d->checks = judged.left;
 }
 
 DiagnosisResult begun(const DiagnosisRequest& of) {
@@ -178,7 +172,7 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
   Diagnosis& d = result.diagnosis;
   const Explanation& named = refit.judged.named;
   fill_judgement(refit.judged, &d);
-  fill_steps(screening, &d);
+  d.steps = screening.steps;
   for (const NestedFit& n : refit.nested) result.fits.emplace_back(n.name, n.tasks);
   d.residual = refit.shape;
   result.residual = refit.residual;
@@ -220,7 +214,7 @@ DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const Parti
   Diagnosis& d = result.diagnosis;
   if (known.screening != nullptr) {
     d.screening = known.screening->rows;
-    fill_steps(*known.screening, &d);
+    d.steps = known.screening->steps;
   }
   if (known.judged != nullptr) fill_judgement(*known.judged, &d);
   const bool base = known.tuned == nullptr;

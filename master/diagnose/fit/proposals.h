@@ -35,12 +35,6 @@ struct EffectCandidate {
 // What a signature gains beyond what is explained, less its penalty.
 double net_gain(const Regression& explained, const Signature& s);
 
-// What the catalogue offered at one step: effect and net gain, best first.
-struct SelectionStep {
-  std::vector<std::string> explained;  // effects named so far
-  std::vector<std::pair<std::string, double>> offered;
-};
-
 struct ChosenEffect {
   EffectCandidate candidate;
   std::vector<std::string> aliases;  // at most three, likeliest first

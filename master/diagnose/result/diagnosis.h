@@ -98,7 +98,8 @@ struct Screened {
   std::vector<std::pair<std::string, double>> detectable_from = {};
 };
 
-struct ResidualCheck {
+// A dependence of what is left once everything that was found is explained.
+struct Leftover {
   std::string covariate;
   double log10_p = 0;
   double excess = 0;  // nats over all trials beyond what chance explains
@@ -106,7 +107,7 @@ struct ResidualCheck {
 
 // One step of the selection: net gain (nats) of the best effects, given what is explained.
 struct SelectionRecord {
-  std::vector<std::string> explained;
+  std::vector<std::string> explained;  // effects named so far
   std::vector<std::pair<std::string, double>> offered;
 };
 
@@ -191,7 +192,7 @@ struct Diagnosis {
   std::vector<Where> unexplained;  // of the final model
   std::vector<Screened> screening;
   std::vector<SelectionRecord> steps;
-  std::vector<ResidualCheck> checks;      // most significant first
+  std::vector<Leftover> checks;           // most significant first
   std::optional<FoundResidual> residual;  // where something is unexplained
   std::vector<NearMiss> nearest;          // nearest first
   std::vector<NextExperiment> next;

@@ -24,7 +24,7 @@ struct Found {
   infer::Model model;
   std::vector<ChosenEffect> chosen;
   std::vector<Screened> rows;
-  std::vector<SelectionStep> steps;
+  std::vector<SelectionRecord> steps;
   std::vector<NearMiss> refused;
   DetectableSizes detectable;
 };
@@ -238,7 +238,7 @@ class Selection {
     if (found_->chosen.empty()) found_->base = contest->base;
     found_->model = contest->base;
     add_rows(of_, hypotheses, *contest, &found_->rows);
-    SelectionStep& step = found_->steps.emplace_back();
+    SelectionRecord& step = found_->steps.emplace_back();
     for (const ChosenEffect& c : found_->chosen) {
       step.explained.push_back(c.candidate.signature.effect);
     }

@@ -104,7 +104,7 @@ struct Screening {
   std::vector<Screened> rows;            // of the table
   std::vector<EffectCandidate> alone;    // of every effect, before anything was chosen
   std::unique_ptr<Proposals> catalogue;  // refers to the evidence
-  std::vector<SelectionStep> steps;
+  std::vector<SelectionRecord> steps;
   std::optional<SanityFinding> warning;  // why nothing is to be looked for
   std::optional<double> explained;       // nats, held out, where hypotheses competed
   std::vector<NearMiss> refused;         // at their bounds
