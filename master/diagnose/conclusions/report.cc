@@ -71,17 +71,17 @@ DiagnosisResult begun(const DiagnosisRequest& of) {
 Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explanation& named,
                                         std::size_t k, const Proposals& catalogue) {
   const ParameterTable& table = of.table();
-  const ChosenEffect& chosen = named.chosen[k];
-  const std::string& own = chosen.candidate.signature.effect;
+  const EffectCandidate& chosen = named.chosen[k];
+  const std::string& own = chosen.effect();
   std::vector<const Signature*> others;
   for (std::size_t j = 0; j < named.chosen.size(); ++j) {
-    if (j != k) others.push_back(&named.chosen[j].candidate.signature);
+    if (j != k) others.push_back(&named.chosen[j].signature);
   }
   const Regression explained = catalogue.with(others);
   ASSIGN_OR_RETURN(auto candidates, catalogue.candidates(explained, {}));
   CompetingCauses alternatives;
   for (const EffectCandidate& c : candidates) {
-    const std::string& name = c.signature.effect;
+    const std::string& name = c.effect();
     const bool alias = contains(chosen.aliases, name);
     if (!alias && name != kind_of(own)) continue;
     Overrides at = named.study().base;
@@ -257,8 +257,8 @@ Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const
                                                const Proposals& catalogue) {
   std::vector<std::string> sentences;
   const Regression explained = explained_by(catalogue, named);
-  for (const ChosenEffect& effect : named.chosen) {
-    const std::string& name = effect.candidate.signature.effect;
+  for (const EffectCandidate& effect : named.chosen) {
+    const std::string& name = effect.effect();
     const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
     if (keys.empty() || kind_of(name) != name) continue;
     ASSIGN_OR_RETURN(const auto second, catalogue.again(explained, name));

@@ -72,16 +72,16 @@ Deviation deviation_of(const Refit& refit, std::size_t row) {
 
 // One row of the table with what the fit and what lies beyond it leave open.
 Estimate reported_estimate(const DiagnosisRequest& of, const Refit& refit,
-                           const ChosenEffect& chosen, std::size_t row, double value) {
+                           const EffectCandidate& chosen, std::size_t row, double value) {
   const Judgement& judged = refit.judged;
   const JointFit& estimates = *judged.named.estimates;
   const Parameter& p = of.table()[row];
   Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
   const Deviation deviation = deviation_of(refit, row);
   if (deviation.fitted > 0) e.sd = deviation.fitted;
-  const double half = kNormal90 * std::hypot(deviation.fitted,
-                                             error_beyond_fit(judged.named.study(), of.table(), row,
-                                                              estimates.at, chosen.candidate.gain));
+  const double half =
+      kNormal90 * std::hypot(deviation.fitted, error_beyond_fit(judged.named.study(), of.table(),
+                                                                row, estimates.at, chosen.gain));
   e.lo = value - half;
   e.hi = value + half;
   if (!e.key.ends_with("direction")) {
@@ -98,13 +98,13 @@ Estimate reported_estimate(const DiagnosisRequest& of, const Refit& refit,
 // Without words, and with a gap that only its change counts of.
 NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size_t k) {
   const Explanation& named = refit.judged.named;
-  const ChosenEffect& chosen = named.chosen[k];
+  const EffectCandidate& chosen = named.chosen[k];
   NamedEffect effect;
-  effect.name = chosen.candidate.signature.effect;
+  effect.name = chosen.effect();
   effect.aliases = chosen.aliases;
   effect.alias_reason =
       alias_sentence(effect.name, effect.aliases, of.subject.lacks(named.study(), of.problem.log));
-  effect.confidence = confidence_of(chosen.candidate.gain, of.subject.least_gain);
+  effect.confidence = confidence_of(chosen.gain, of.subject.least_gain);
   for (const auto& [row, value] : named.estimates->at) {
     const Parameter& p = of.table()[row];
     if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
@@ -234,7 +234,7 @@ std::vector<NamedEffect> named_effects(const DiagnosisRequest& of, const Refit& 
   const Explanation& named = refit.judged.named;
   std::vector<std::pair<double, NamedEffect>> all;
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {
-    all.emplace_back(named.chosen[k].candidate.gain, named_mean(of, refit, k));
+    all.emplace_back(named.chosen[k].gain, named_mean(of, refit, k));
   }
   for (const FoundSpread& found : named.spreads) {
     all.emplace_back(found.fit.gain, named_spread(of, refit, found));

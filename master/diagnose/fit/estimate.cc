@@ -45,7 +45,7 @@ std::vector<FittedParameter> parameters_of(const Study& study, const Overrides& 
       const Parameter& p = (*study.table)[row];
       // Where a seam runs is searched, not sloped: residuals jump as a trial changes sides.
       const bool jumps = p.kind != ParameterKind::kReal || is_seam_position(p.key);
-      if (p.effect == effect.signature.effect && !jumps) parameters.push_back({row, value, 0});
+      if (p.effect == effect.effect() && !jumps) parameters.push_back({row, value, 0});
     }
   }
   return parameters;

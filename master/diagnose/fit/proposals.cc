@@ -49,7 +49,7 @@ std::string Proposals::offered_as(const Signature& s, const std::set<std::string
   const auto are_two = study_->subject->effects->row(s.effect).are_two;
   if (second.empty() || are_two == nullptr || !may_be_second(second, without)) return "";
   for (const EffectCandidate& first : beside) {
-    if (first.signature.effect == s.effect && are_two(first.signature, s)) return second;
+    if (first.effect() == s.effect && are_two(first.signature, s)) return second;
   }
   return "";
 }
@@ -59,7 +59,7 @@ std::optional<Patch> Proposals::first_patch(const std::set<std::string>& without
                                             const std::vector<EffectCandidate>& beside) const {
   if (!without.count(kPatchEffect) || !may_be_second(second_of(kPatchEffect), without)) return {};
   for (const EffectCandidate& first : beside) {
-    if (first.signature.effect == kPatchEffect) return patch_of(first.signature);
+    if (first.effect() == kPatchEffect) return patch_of(first.signature);
   }
   return {};
 }
@@ -92,7 +92,7 @@ Result<std::vector<EffectCandidate>> Proposals::candidates(
   }
   drop_linear_views(explained, &best);
   for (auto& [effect, candidate] : best) {
-    if (candidate.signature.effect != effect)
+    if (candidate.effect() != effect)
       candidate.signature = renamed(std::move(candidate.signature), effect);
   }
   std::vector<EffectCandidate> sorted;
@@ -121,11 +121,11 @@ bool Proposals::is_new(const std::vector<Signature>& first,
                        const std::vector<EffectCandidate>& chosen, const EffectCandidate& candidate,
                        double explained) const {
   const EffectDiagnoses& effects = *study_->subject->effects;
-  const EffectFamily* family = effects.row(candidate.signature.effect).family;
+  const EffectFamily* family = effects.row(candidate.effect()).family;
   if (family != nullptr) {
     double gained = 0;
     for (const EffectCandidate& c : chosen) {
-      if (effects.row(c.signature.effect).family == family) gained += c.gain;
+      if (effects.row(c.effect()).family == family) gained += c.gain;
     }
     if (candidate.gain < family->share * gained) return false;
   }

@@ -30,15 +30,13 @@ inline constexpr double kWorthSearchingShare = 0.3;
 struct EffectCandidate {
   double gain = 0;  // net of the signature's penalty, nats
   Signature signature;
+  std::vector<std::string> aliases = {};  // of a chosen one: at most three, likeliest first
+
+  const std::string& effect() const { return signature.effect; }
 };
 
 // What a signature gains beyond what is explained, less its penalty.
 double net_gain(const Regression& explained, const Signature& s);
-
-struct ChosenEffect {
-  EffectCandidate candidate;
-  std::vector<std::string> aliases;  // at most three, likeliest first
-};
 
 class Proposals {
  public:

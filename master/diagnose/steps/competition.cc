@@ -177,7 +177,7 @@ std::vector<std::uint32_t> Competition::touched_by(const std::string& effect,
 infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
                                        const Regression& explained) const {
   infer::Hypothesis h;
-  h.name = mark.signature.effect;
+  h.name = mark.effect();
   h.coordinates = coordinates_of(h.name);
   h.from_neutral = false;
   const auto dimensions = static_cast<double>(base_.only(h.coordinates).dimensions());

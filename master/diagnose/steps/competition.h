@@ -60,6 +60,6 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
 // Of what was chosen, by the model's slopes; nothing of what has a place.
 void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
                               const Competition& competition, const infer::Model& model,
-                              const std::vector<ChosenEffect>& chosen, DetectableSizes* all);
+                              const std::vector<EffectCandidate>& chosen, DetectableSizes* all);
 
 }  // namespace gapfarm::steps

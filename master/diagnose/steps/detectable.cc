@@ -137,13 +137,12 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
 
 void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
                               const Competition& competition, const infer::Model& model,
-                              const std::vector<ChosenEffect>& chosen, DetectableSizes* all) {
+                              const std::vector<EffectCandidate>& chosen, DetectableSizes* all) {
   const double noise = noise_of(model);
-  double explained_nats = 0;
-  for (const ChosenEffect& c : chosen) explained_nats += c.candidate.gain;
+  const double explained_nats = sum_of_gains(chosen);
   Eigen::Index at = competition.base().dimensions();
-  for (const ChosenEffect& c : chosen) {
-    const std::string& effect = c.candidate.signature.effect;
+  for (const EffectCandidate& c : chosen) {
+    const std::string& effect = c.effect();
     const std::vector<infer::Coordinate> coordinates = competition.coordinates_of(effect);
     const Eigen::Index own = competition.base().only(coordinates).dimensions();
     const Eigen::MatrixXd slopes = model.fit.slopes.middleCols(at, own) / noise;
@@ -151,8 +150,8 @@ void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
     others.middleCols(at, own).setZero();
     at += own;
     if (!of.subject.effects->row(effect).places.empty()) continue;
-    const double squares = infer::detectable_squares(
-        least_gain_of(effect, study, explained_nats - c.candidate.gain), own);
+    const double squares =
+        infer::detectable_squares(least_gain_of(effect, study, explained_nats - c.gain), own);
     add_reached(of, competition, effect, coordinates, infer::information(slopes, others), squares,
                 all);
   }

@@ -22,7 +22,7 @@ namespace {
 struct Found {
   infer::Model base;  // alone
   infer::Model model;
-  std::vector<ChosenEffect> chosen;
+  std::vector<EffectCandidate> chosen;
   std::vector<Screened> rows;
   std::vector<SelectionRecord> steps;
   std::vector<NearMiss> refused;
@@ -114,9 +114,7 @@ class Selection {
       if (!more) break;
     }
     if (Status s = measure_reach(); !s) return s.error();
-    std::ranges::stable_sort(found_->chosen, [](const ChosenEffect& a, const ChosenEffect& b) {
-      return a.candidate.gain > b.candidate.gain;
-    });
+    std::ranges::stable_sort(found_->chosen, std::ranges::greater{}, &EffectCandidate::gain);
     return std::move(*found_);
   }
 
@@ -132,7 +130,7 @@ class Selection {
   // What the last contest was offered would have been named from some size on, as what was chosen.
   Status measure_reach() {
     std::set<std::string> without;
-    for (const ChosenEffect& c : found_->chosen) without.insert(c.candidate.signature.effect);
+    for (const EffectCandidate& c : found_->chosen) without.insert(c.effect());
     if (marks_ == nullptr) {
       ASSIGN_OR_RETURN(
           found_->detectable,
@@ -143,21 +141,17 @@ class Selection {
     return {};
   }
 
-  double explained() const {
-    double sum = 0;
-    for (const ChosenEffect& c : found_->chosen) sum += c.candidate.gain;
-    return sum;
-  }
+  double explained() const { return sum_of_gains(found_->chosen); }
 
   std::size_t size_of(std::size_t chosen) const {
-    return competition_.coordinates_of(found_->chosen[chosen].candidate.signature.effect).size();
+    return competition_.coordinates_of(found_->chosen[chosen].effect()).size();
   }
 
   // What slopes promise beyond the present model.
   Result<std::vector<infer::Hypothesis>> proposed() {
-    const std::vector<EffectCandidate> chosen = candidates_of(found_->chosen);
+    const std::vector<EffectCandidate>& chosen = found_->chosen;
     std::set<std::string> without = not_these_;
-    for (const EffectCandidate& c : chosen) without.insert(c.signature.effect);
+    for (const EffectCandidate& c : chosen) without.insert(c.effect());
     if (marks_ == nullptr) return competition_.of_rows(without);
     Regression explained = marks_->nothing_explained();
     explained.restart(competition_.unexplained(found_->model));
@@ -172,8 +166,8 @@ class Selection {
       if (mark.gain < kWorthSearchingShare * best) break;
       // A search may do better than slopes say, but not by more than they are trusted for.
       const double most = infer::kMostTrust * mark.gain;
-      if (most < least_gain_of(mark.signature.effect, study_, this->explained())) continue;
-      if (not_these_.count(mark.signature.effect)) continue;
+      if (most < least_gain_of(mark.effect(), study_, this->explained())) continue;
+      if (not_these_.count(mark.effect())) continue;
       if (!marks_->is_new(first_, chosen, mark, this->explained())) continue;
       best = std::max(best, mark.gain);
       hypotheses.push_back(competition_.of_mark(mark, explained));
@@ -194,7 +188,7 @@ class Selection {
   void use_slopes() {
     Eigen::Index at = competition_.base().dimensions();
     for (std::size_t k = 0; k < found_->chosen.size(); ++k) {
-      Signature& mark = found_->chosen[k].candidate.signature;
+      Signature& mark = found_->chosen[k].signature;
       const Eigen::Index own =
           competition_.base().only(competition_.coordinates_of(mark.effect)).dimensions();
       mark.columns = competition_.in_all_trials(found_->model.fit.slopes.middleCols(at, own));
@@ -216,11 +210,11 @@ class Selection {
       const infer::PairedGain gain =
           infer::gain_over(found_->model, without, competition_.base().dimensions());
       if (gain.sum >= of_.subject.least_gain && gain.sum >= infer::kSureGain * gain.se) {
-        found_->chosen[k].candidate.gain = gain.sum;
+        found_->chosen[k].gain = gain.sum;
         first += size_of(k++);
         continue;
       }
-      not_these_.insert(found_->chosen[k].candidate.signature.effect);
+      not_these_.insert(found_->chosen[k].effect());
       found_->model = std::move(without);
       found_->chosen.erase(found_->chosen.begin() + static_cast<std::ptrdiff_t>(k));
     }
@@ -239,9 +233,7 @@ class Selection {
     found_->model = contest->base;
     add_rows(of_, hypotheses, *contest, &found_->rows);
     SelectionRecord& step = found_->steps.emplace_back();
-    for (const ChosenEffect& c : found_->chosen) {
-      step.explained.push_back(c.candidate.signature.effect);
-    }
+    step.explained = mapped(found_->chosen, &EffectCandidate::effect);
     for (const infer::Contender& c : contest->contenders) {
       step.offered.emplace_back(hypotheses[c.hypothesis].name, c.gain);
     }
@@ -254,9 +246,9 @@ class Selection {
       not_these_.insert(name);
       return true;
     }
-    ChosenEffect chosen;
-    chosen.candidate.gain = best.gain;
-    chosen.candidate.signature.effect = name;
+    EffectCandidate chosen;
+    chosen.gain = best.gain;
+    chosen.signature.effect = name;
     chosen.aliases = aliases_of(of_, name, hypotheses, *contest);
     found_->chosen.push_back(std::move(chosen));
     found_->model = std::move(best.model);
@@ -295,7 +287,7 @@ Status measure_nuisances_there(const DiagnosisRequest& of, const JointFit& fit,
 // The chosen effects beside the base as it was tuned: data as if their predictions were linear.
 Status relinearise(const DiagnosisRequest& of, Screening* screening) {
   Explanation& named = screening->found;
-  const std::vector<EffectCandidate> effects = candidates_of(named.chosen);
+  const std::vector<EffectCandidate>& effects = named.chosen;
   ASSIGN_OR_RETURN(auto first, estimate(of, *screening->catalogue, named, effects, 2));
   named.estimates = std::move(first);
   RETURN_IF_ERROR(measure_nuisances_there(of, *named.estimates, screening));
@@ -306,7 +298,7 @@ Status relinearise(const DiagnosisRequest& of, Screening* screening) {
   if (there.columns.empty()) return {};
   screening->catalogue->restart(there.data);
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {
-    named.chosen[k].candidate.signature.columns = there.columns[k];
+    named.chosen[k].signature.columns = there.columns[k];
   }
   return {};
 }
@@ -324,13 +316,11 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Study& from
   named.evidence = std::make_shared<const Evidence>(std::move(evidence));
   screening->catalogue = std::make_unique<Proposals>(
       of.predictor, named.study(), std::vector<Signature>(), named.evidence->base);
-  screening->explained = 0;
-  for (const ChosenEffect& e : named.chosen) *screening->explained += e.candidate.gain;
+  screening->explained = sum_of_gains(named.chosen);
   if (named.chosen.empty()) return {};
-  ASSIGN_OR_RETURN(
-      named.estimates,
-      fit_jointly(of.predictor, named.study(), candidates_of(named.chosen), named.study().base,
-                  BaseParameters::kFitted, named.evidence->nuisances, 1));
+  ASSIGN_OR_RETURN(named.estimates,
+                   fit_jointly(of.predictor, named.study(), named.chosen, named.study().base,
+                               BaseParameters::kFitted, named.evidence->nuisances, 1));
   return {};
 }
 

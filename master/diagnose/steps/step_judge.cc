@@ -41,19 +41,18 @@ std::vector<NearMiss> nearest(const DiagnosisRequest& of, const Screening& scree
                               const std::vector<Leftover>& left) {
   const Evidence& evidence = *screening.found.evidence;
   std::vector<NearMiss> nearest;
-  std::vector<std::string> together = mapped(
-      screening.found.chosen, [](const ChosenEffect& c) { return c.candidate.signature.effect; });
+  std::vector<std::string> together = mapped(screening.found.chosen, &EffectCandidate::effect);
   if (!together.empty()) nearest.push_back(near_miss(of, together, nats, left));
   for (std::size_t k = 0; k < std::min(kNearestAlone, screening.alone.size()); ++k) {
     const EffectCandidate& alone = screening.alone[k];
-    const bool agrees = together.size() == 1 && together.front() == alone.signature.effect;
+    const bool agrees = together.size() == 1 && together.front() == alone.effect();
     if (!(alone.gain > 0) || agrees) continue;
     Regression with = evidence.base;
     Eigen::MatrixXd columns = alone.signature.columns;
     evidence.study.drop_ignored(columns);
     with.add(columns);
     nearest.push_back(
-        near_miss(of, {alone.signature.effect}, alone.gain, leftovers(with, evidence.blocks)));
+        near_miss(of, {alone.effect()}, alone.gain, leftovers(with, evidence.blocks)));
   }
   return nearest;
 }
@@ -103,7 +102,7 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
   Regression without_it(nuisances.leftCols(nuisances.cols() - study.misfit_columns),
                         explanation.estimates ? study.whiten(explanation.estimates->residuals)
                                               : study.whitened_residuals());
-  for (const ChosenEffect& c : explanation.chosen) without_it.add(c.candidate.signature.columns);
+  for (const EffectCandidate& c : explanation.chosen) without_it.add(c.signature.columns);
   const std::vector<Leftover> common =
       leftovers(without_it, {{"what its repeats have in common",
                               nuisances.rightCols(study.misfit_columns), study.misfit_expected}});
@@ -168,9 +167,9 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
     named.spreads.push_back(
         {kRounding, {grid.nats, {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}}}});
   }
-  const bool two = std::any_of(named.chosen.begin(), named.chosen.end(), [](const ChosenEffect& c) {
-    return kind_of(c.candidate.signature.effect) != c.candidate.signature.effect;
-  });
+  const bool two =
+      std::any_of(named.chosen.begin(), named.chosen.end(),
+                  [](const EffectCandidate& c) { return kind_of(c.effect()) != c.effect(); });
   judged.verdict = judge_verdict(named.names_anything(), nats, judged.left,
                                  of.subject.unknown_log10_p, two ? kWrongShareOfTwo : kWrongShare);
   if (on_grid && !names_grid) {
@@ -285,7 +284,7 @@ std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<Ne
   double least = INFINITY;
   for (std::size_t k = judged.named.chosen.size(); k-- > 0;) {
     const bool last = k + 1 == judged.named.chosen.size();
-    if (!last && put_last.count(judged.named.chosen[k].candidate.signature.effect)) continue;
+    if (!last && put_last.count(judged.named.chosen[k].effect())) continue;
     const std::vector<double>&with = nested[before + k + 1].scores,
           &without_it = nested[before + k].scores;
     const double gain = mean(with) - mean(without_it);
@@ -301,9 +300,9 @@ std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<Ne
 
 Judgement dropped(Judgement judged, const Worthless& effect) {
   const auto gone = judged.named.chosen.begin() + static_cast<std::ptrdiff_t>(effect.effect);
-  const std::string& name = gone->candidate.signature.effect;
+  const std::string& name = gone->effect();
   judged.cautions.push_back(name + effect.why);
-  judged.nearest.push_back({{name}, gone->candidate.gain, 0, "", name + effect.why});
+  judged.nearest.push_back({{name}, gone->gain, 0, "", name + effect.why});
   judged.named.chosen.erase(gone);
   return judged;
 }

@@ -28,8 +28,8 @@ std::vector<bool> informative_about_slips(const DiagnosisRequest& of, const Expl
     for (const FoundSpread& found : partial.spreads) {
       if (found.row != nullptr && found.row->contaminates(trial)) informative[i] = false;
     }
-    for (const ChosenEffect& effect : partial.chosen) {
-      const Signature& chosen = effect.candidate.signature;
+    for (const EffectCandidate& effect : partial.chosen) {
+      const Signature& chosen = effect.signature;
       const auto contaminates = of.subject.effects->row(chosen.effect).contaminates;
       if (contaminates != nullptr && contaminates(chosen, trial)) informative[i] = false;
     }
@@ -157,8 +157,8 @@ Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
 
 std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Explanation& before,
                                           const Proposals& catalogue, const Explanation& rest) {
-  const auto has_place = [&](const ChosenEffect& c) {
-    return of.subject.effects->row(c.candidate.signature.effect).contaminates != nullptr;
+  const auto has_place = [&](const EffectCandidate& c) {
+    return of.subject.effects->row(c.effect()).contaminates != nullptr;
   };
   if (std::none_of(before.chosen.begin(), before.chosen.end(), has_place)) return {};
   if (std::any_of(rest.chosen.begin(), rest.chosen.end(), has_place)) return {};

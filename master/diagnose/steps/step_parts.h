@@ -76,7 +76,7 @@ std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Expl
 Regression explained_by(const Proposals& catalogue, const Explanation& explanation);
 double explained_nats(const Proposals& catalogue, const Regression& explained);
 
-std::vector<EffectCandidate> candidates_of(const std::vector<ChosenEffect>& chosen);
+double sum_of_gains(const std::vector<EffectCandidate>& chosen);
 // Base and these effects at their best linear fit.
 Overrides start_of(const DiagnosisRequest& of, const Proposals& catalogue,
                    const Explanation& partial, const std::vector<EffectCandidate>& effects);

@@ -53,8 +53,8 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
       named.chosen.empty() ? study : with_whole_base(of, study_beside(named, *named.estimates));
   for (std::size_t count = 0; count <= named.chosen.size(); ++count) {
     if (count > 0) {
-      effects.push_back(named.chosen[count - 1].candidate);
-      names.insert(effects.back().signature.effect);
+      effects.push_back(named.chosen[count - 1]);
+      names.insert(effects.back().effect());
     }
     const bool alone = count == 0;
     Overrides start = alone && !named.tuned_alone.empty() ? named.tuned_alone : study.base;
@@ -72,7 +72,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
     std::string name =
         named.as_logged ? "the tuned base, late readings put right" : "the tuned base";
     for (std::size_t k = 0; k < effects.size(); ++k) {
-      name += (k == 0 ? ", " : " and ") + effects[k].signature.effect;
+      name += (k == 0 ? ", " : " and ") + effects[k].effect();
     }
     Study scored_in = alone ? study : with_whole_base(of, study_beside(named, fit));
     nested.push_back(nested_fit(of, name, std::move(fit), fitted_in, std::move(scored_in), folds));
@@ -86,7 +86,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
 // robot may fall over.
 Result<JointFit> estimate_beside(const DiagnosisRequest& of, const Explanation& named,
                                  const NestedFit& with_base) {
-  return fit_jointly(of.predictor, named.study(), candidates_of(named.chosen), with_base.fit.at,
+  return fit_jointly(of.predictor, named.study(), named.chosen, with_base.fit.at,
                      BaseParameters::kHeld, named.evidence->nuisances, kMostRounds,
                      Loss::kRedescending);
 }
@@ -98,9 +98,9 @@ Result<Refit> with_correction(const DiagnosisRequest& of, const Screening& scree
                               const std::vector<std::size_t>& folds) {
   const Explanation& named = refit.judged.named;
   if (refit.judged.unnamed.empty() || of.options.keep_base) return refit;
-  const std::vector<EffectCandidate> effects = candidates_of(refit.judged.unnamed);
+  const std::vector<EffectCandidate>& effects = refit.judged.unnamed;
   std::set<std::string> names;
-  for (const EffectCandidate& effect : effects) names.insert(effect.signature.effect);
+  for (const EffectCandidate& effect : effects) names.insert(effect.effect());
   const Study& study = named.study();
   Overrides start =
       named.estimates ? study.base : start_of(of, *screening.catalogue, named, effects);
@@ -155,8 +155,9 @@ Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, 
 
 // Beside a gap of something else a prediction misses either way, and what explains the rest shows
 // only when that is explained: an effect has to be of no use beside all others.
-void put_last(std::size_t effect, std::vector<ChosenEffect>* chosen, std::set<std::string>* names) {
-  names->insert((*chosen)[effect].candidate.signature.effect);
+void put_last(std::size_t effect, std::vector<EffectCandidate>* chosen,
+              std::set<std::string>* names) {
+  names->insert((*chosen)[effect].effect());
   const auto at = chosen->begin() + static_cast<std::ptrdiff_t>(effect);
   std::rotate(at, at + 1, chosen->end());
 }
@@ -199,8 +200,8 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   Explanation& named = refit.judged.named;
   const std::size_t found = named.chosen.size();
   if (found > 0) {
-    ASSIGN_OR_RETURN(auto fit, estimate(of, *screening.catalogue, named,
-                                        candidates_of(named.chosen), named.estimates ? 1 : 2));
+    ASSIGN_OR_RETURN(
+        auto fit, estimate(of, *screening.catalogue, named, named.chosen, named.estimates ? 1 : 2));
     named.estimates = std::move(fit);
     emit_fit(of, *named.estimates);
   }

@@ -46,7 +46,7 @@ std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evide
       const double lengths = explained[i].norm() * explained[j].norm();
       if (i == j || lengths == 0) continue;
       if (std::abs(explained[i].dot(explained[j])) > kAliasCosine * lengths) {
-        row.alias_set.push_back(candidates[j].signature.effect);
+        row.alias_set.push_back(candidates[j].effect());
       }
     }
     rows.push_back(std::move(row));
@@ -109,7 +109,7 @@ std::vector<Eigen::Vector3d> left_with_sessions(const Explanation& found) {
   Eigen::VectorXd residuals = study.whitened_residuals();
   study.drop_ignored(residuals);
   Regression explained(all.rightCols(all.cols() - sessions), residuals);
-  for (const ChosenEffect& c : found.chosen) explained.add(c.candidate.signature.columns);
+  for (const EffectCandidate& c : found.chosen) explained.add(c.signature.columns);
   return study.unwhiten(explained.left());
 }
 
@@ -191,9 +191,8 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
   std::vector<PredictionRequest> without;
   for (const EffectCandidate& effect : effects) {
     without.push_back({fit.at, {}});
-    std::erase_if(without.back().at, [&](const auto& entry) {
-      return table[entry.first].effect == effect.signature.effect;
-    });
+    std::erase_if(without.back().at,
+                  [&](const auto& entry) { return table[entry.first].effect == effect.effect(); });
   }
   ASSIGN_OR_RETURN(const auto ends, of.predictor.attempt(without));
   for (const auto& simulated : ends) {
@@ -201,7 +200,7 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
   }
   Relinearised at_estimate{study.whiten(fit.residuals), {}};
   for (std::size_t k = 0; k < effects.size(); ++k) {
-    const std::string& name = effects[k].signature.effect;
+    const std::string& name = effects[k].effect();
     std::vector<Eigen::Vector3d> contribution;
     for (std::size_t i = 0; i < study.size(); ++i) {
       contribution.push_back(local_difference((*ends[k])[i], fit.ends[i]));
@@ -246,14 +245,16 @@ Status screen_alone(const DiagnosisRequest& of, const Explanation& found, Screen
   return {};
 }
 
-std::vector<EffectCandidate> candidates_of(const std::vector<ChosenEffect>& chosen) {
-  return mapped(chosen, &ChosenEffect::candidate);
+double sum_of_gains(const std::vector<EffectCandidate>& chosen) {
+  double sum = 0;
+  for (const EffectCandidate& c : chosen) sum += c.gain;
+  return sum;
 }
 
 Regression explained_by(const Proposals& catalogue, const Explanation& explanation) {
   std::vector<const Signature*> all;
   for (const Signature& s : explanation.first) all.push_back(&s);
-  for (const ChosenEffect& c : explanation.chosen) all.push_back(&c.candidate.signature);
+  for (const EffectCandidate& c : explanation.chosen) all.push_back(&c.signature);
   return catalogue.with(all);
 }
 
@@ -287,7 +288,7 @@ Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue
   for (const EffectCandidate& effect : effects) {
     for (const auto& [row, value] : partial.estimates ? partial.estimates->at : Overrides{}) {
       const std::string& belongs = of.table()[row].effect;
-      if (belongs == effect.signature.effect || (belongs.empty() && moves)) start[row] = value;
+      if (belongs == effect.effect() || (belongs.empty() && moves)) start[row] = value;
     }
   }
   const BaseParameters base = moves ? BaseParameters::kFitted : BaseParameters::kHeld;

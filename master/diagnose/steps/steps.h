@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/ranges.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/diagnose.h"
 #include "master/diagnose/evidence/covariates.h"
@@ -68,7 +69,7 @@ struct Explanation {
   SlipFit slip;  // of the slips that are named
   // What is named of readings, single trials and sessions.
   std::vector<FoundSpread> spreads;
-  std::vector<ChosenEffect> chosen;
+  std::vector<EffectCandidate> chosen;
   std::optional<JointFit> estimates;  // of these, base held, beside nuisances
 
   std::string odd_readings;  // what readings show that no effect looked for explains
@@ -76,13 +77,11 @@ struct Explanation {
 
   const Study& study() const { return evidence->study; }
   bool chose(const std::string& effect) const {
-    return std::ranges::any_of(
-        chosen, [&](const ChosenEffect& c) { return c.candidate.signature.effect == effect; });
+    return contains(chosen, effect, &EffectCandidate::effect);
   }
   bool names_session_gains() const { return study().session_spread > 0; }
   const FoundSpread* spread(const std::string& effect) const {
-    const auto at = std::ranges::find(spreads, effect, &FoundSpread::effect);
-    return at == spreads.end() ? nullptr : &*at;
+    return find_by(spreads, effect, &FoundSpread::effect);
   }
   void drop_spread(const std::string& effect) {
     std::erase_if(spreads, [&](const FoundSpread& s) { return s.effect == effect; });
@@ -119,7 +118,7 @@ struct Judgement {
   double scale = 1;  // leftover variance over the noise's
   // What explains something, but too little of what is there to be named: as a correction it may
   // still help.
-  std::vector<ChosenEffect> unnamed;
+  std::vector<EffectCandidate> unnamed;
   std::vector<NearMiss> nearest;
   std::vector<std::string> cautions;
   std::vector<SanityFinding> warnings;  // with any, nothing is to be named

@@ -125,7 +125,7 @@ void emit_candidates(const DiagnosisRequest& of, const std::vector<EffectCandida
   finding.columns = {"effect", "would gain, nats"};
   for (std::size_t i = 0; i < std::min(best.size(), kMostCandidates); ++i) {
     if (best[i]->gain <= 0) break;
-    finding.rows.emplace_back(best[i]->signature.effect, three_digits(best[i]->gain));
+    finding.rows.emplace_back(best[i]->effect(), three_digits(best[i]->gain));
   }
   of.options.on_finding(std::move(finding));
 }
@@ -152,17 +152,16 @@ void emit_fit(const DiagnosisRequest& of, const JointFit& fit) {
 void emit_choice(const DiagnosisRequest& of, const Explanation& found, bool has_warnings) {
   if (!watched(of)) return;
   std::vector<std::string> names;
-  for (const ChosenEffect& c : found.chosen) names.push_back(c.candidate.signature.effect);
+  for (const EffectCandidate& c : found.chosen) names.push_back(c.effect());
   for (const FoundSpread& s : found.spreads) names.push_back(s.effect);
   Finding finding{"what explains the gap", "", {}, {}};
   finding.text = has_warnings
                      ? "The base is in question, so nothing of the catalogue is looked for."
                  : names.empty() ? "Nothing of the catalogue explains more than chance does."
                                  : "Chosen from the catalogue so far: " + listed(names) + ".";
-  for (const ChosenEffect& c : found.chosen) {
+  for (const EffectCandidate& c : found.chosen) {
     for (const std::string& alias : c.aliases) {
-      finding.text +=
-          " " + c.candidate.signature.effect + " is not distinguished from " + alias + ".";
+      finding.text += " " + c.effect() + " is not distinguished from " + alias + ".";
     }
   }
   of.options.on_finding(std::move(finding));

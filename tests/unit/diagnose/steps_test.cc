@@ -292,7 +292,7 @@ TEST(Nuisances, HoldTheGaugesSlope) {
 struct Measured : Driven {
   Measured() : Driven(1.02), subject(diagnosis_subject(problem)) {
     found.evidence = std::make_shared<const steps::Evidence>(evidence_of(of, study).value());
-    found.chosen.push_back({{30, signature_of("backlash", column(60, even))}, {}});
+    found.chosen.push_back({30, signature_of("backlash", column(60, even))});
   }
 
   std::shared_ptr<const DiagnosisSubject> subject;
@@ -356,7 +356,7 @@ TEST(Steps, ABaseInWarnOfHasNothingNamed) {
 
 TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
   Measured m;
-  m.found.chosen.push_back({{20, signature_of("timing_offset", column(60, odd))}, {}});
+  m.found.chosen.push_back({20, signature_of("timing_offset", column(60, odd))});
   steps::Judgement judged;
   judged.named = m.found;
   std::vector<steps::NestedFit> nested(3);
@@ -371,12 +371,12 @@ TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
   EXPECT_EQ(worthless->effect, 0u);
   // Beside all others it was of use: seed 31's aspect and turned marker, each of which showed only
   // when the other was explained.
-  const std::string first = judged.named.chosen[0].candidate.signature.effect;
+  const std::string first = judged.named.chosen[0].effect();
   EXPECT_FALSE(of_no_use(judged, nested, std::nullopt, {first}));
   EXPECT_TRUE(of_no_use(judged, nested, std::nullopt, {"timing_offset"}));
   const steps::Judgement rest = dropped(judged, *worthless);
   ASSERT_EQ(rest.named.chosen.size(), 1u);
-  EXPECT_EQ(rest.named.chosen[0].candidate.signature.effect, "timing_offset");
+  EXPECT_EQ(rest.named.chosen[0].effect(), "timing_offset");
   EXPECT_EQ(rest.nearest.size(), 1u);
   nested[1].scores = scores(0.5, 0);
   EXPECT_FALSE(of_no_use(judged, nested, std::nullopt));
