@@ -35,8 +35,8 @@ const EffectDiagnosis* EffectDiagnoses::find(std::string_view effect) const {
 }
 
 std::size_t EffectDiagnoses::place_in_catalogue(std::string_view effect) const {
-  const auto is_it = [&](const EffectDiagnosis* row) { return row->effect == effect; };
-  return static_cast<std::size_t>(std::find_if(rows_.begin(), rows_.end(), is_it) - rows_.begin());
+  const auto found = std::ranges::find(rows_, effect, &EffectDiagnosis::effect);
+  return static_cast<std::size_t>(found - rows_.begin());
 }
 
 const EffectDiagnosis& EffectDiagnoses::row(std::string_view effect) const {

@@ -105,9 +105,25 @@ void Study::drop_ignored(Eigen::Ref<Eigen::MatrixXd> rows) const {
   }
 }
 
-Eigen::VectorXd Study::whitened_residuals() const {
-  std::vector<Eigen::Vector3d> residuals = mapped(trials, &ResidualTrial::residual);
-  return whiten(residuals);
+std::vector<Eigen::Vector3d> Study::residuals() const {
+  return mapped(trials, &ResidualTrial::residual);
+}
+
+std::vector<Eigen::Vector3d> Study::residuals_about(const std::vector<Pose>& ends) const {
+  std::vector<Eigen::Vector3d> residuals;
+  for (std::size_t i = 0; i < size(); ++i) residuals.push_back(residual_of(trials[i], ends[i]));
+  return residuals;
+}
+
+void Study::use_residuals(const std::vector<Eigen::Vector3d>& residuals) {
+  for (std::size_t i = 0; i < size(); ++i) trials[i].residual = residuals[i];
+}
+
+std::vector<Pose> Study::predicted_ends() const { return mapped(trials, &ResidualTrial::X_WP); }
+
+void Study::use_predicted_ends(const std::vector<Pose>& ends) {
+  for (std::size_t i = 0; i < size(); ++i) trials[i].X_WP = ends[i];
+  use_residuals(residuals_about(ends));
 }
 
 std::vector<Eigen::Vector3d> Study::unwhiten(const Eigen::VectorXd& rows) const {
@@ -198,11 +214,11 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes) {
   return study;
 }
 
-std::vector<Eigen::Vector3d> differences(const Study& study, const std::vector<Pose>& ends,
+std::vector<Eigen::Vector3d> differences(const std::vector<Pose>& from, const std::vector<Pose>& to,
                                          double scale) {
   std::vector<Eigen::Vector3d> d;
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    d.push_back(local_difference(study.trials[i].X_WP, ends[i]) / scale);
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    d.push_back(local_difference(from[i], to[i]) / scale);
   }
   return d;
 }

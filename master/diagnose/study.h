@@ -87,7 +87,14 @@ struct Study {
   const NoiseEstimate& predictive_noise() const { return predictive ? *predictive : noise; }
   // Three rows a trial.
   Eigen::VectorXd whiten(const std::vector<Eigen::Vector3d>& values) const;
-  Eigen::VectorXd whitened_residuals() const;
+  std::vector<Eigen::Vector3d> residuals() const;
+  Eigen::VectorXd whitened_residuals() const { return whiten(residuals()); }
+  // Of the measured ends, were they predicted there.
+  std::vector<Eigen::Vector3d> residuals_about(const std::vector<Pose>& ends) const;
+  void use_residuals(const std::vector<Eigen::Vector3d>& residuals);
+  std::vector<Pose> predicted_ends() const;
+  // With the residuals about them.
+  void use_predicted_ends(const std::vector<Pose>& ends);
   bool ignores(std::size_t trial) const { return !ignored.empty() && ignored[trial]; }
   // Zeroes the rows of ignored trials.
   void drop_ignored(Eigen::Ref<Eigen::MatrixXd> rows) const;
@@ -111,10 +118,9 @@ Status tune_base(Predictor& predictor, bool keep, Study* study);
 // Rows of the base's parameters whose value in `at` lies where tuning has to stop.
 std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at);
 
-// Predictions with `extra` on top of the tuned base, as differences from the base's in the axes of
-// the base's ends, divided by `scale`.
-std::vector<Eigen::Vector3d> differences(const Study& study, const std::vector<Pose>& ends,
-                                         double scale);
+// From the first ends to the others, in the axes of the first, divided by `scale`.
+std::vector<Eigen::Vector3d> differences(const std::vector<Pose>& from, const std::vector<Pose>& to,
+                                         double scale = 1);
 
 // Whether a drive sticks: Coulomb treads then give way to no small force, real ones creep in
 // proportion to it.

@@ -70,10 +70,10 @@ struct DiagnosisSubject {
   // Null where base and hypotheses are searched together instead: EffectDiagnosis::searched.
   Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
                                                const std::vector<std::string>& excluded) = nullptr;
-  // Whether the robot touches the disc in each trial, with the study's base; null as above, as is
+  // Trials in which the robot touches the disc, with the study's base; null as above, as is
   // `patches`.
-  std::vector<bool> (*touched_by)(const Problem& problem, const Study& study,
-                                  const Patch& patch) = nullptr;
+  std::vector<std::uint32_t> (*touched_by)(const Problem& problem, const Study& study,
+                                           const Patch& patch) = nullptr;
   PatchSearch (*patches)(Predictor& predictor, const Study& study) = nullptr;
   // The parts of the log that are predicted from the others, one number a trial.
   std::vector<std::size_t> (*folds)(const Study& study);

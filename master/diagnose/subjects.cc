@@ -23,10 +23,7 @@ PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
   const auto sketch = std::make_shared<const PatchSketch>(predictor.problem(), study);
   return
       [sketch](const Regression& explained, const PatchWish& wish) -> Result<std::vector<Patch>> {
-        std::vector<Patch> patches =
-            mapped(sketch->search(explained, wish),
-                   [](const PatchSketch::Place& place) { return place.patch; });
-        return patches;
+        return mapped(sketch->search(explained, wish), &PatchSketch::Place::patch);
       };
 }
 
@@ -45,15 +42,15 @@ double nearest_to(const Patch& patch, const Pose& X_WS, const Twist& motion,
   return nearest;
 }
 
-std::vector<bool> touched_by_drives(const Problem& problem, const Study& study,
-                                    const Patch& patch) {
+std::vector<std::uint32_t> touched_by_drives(const Problem& problem, const Study& study,
+                                             const Patch& patch) {
   constexpr double kSpare_m = 0.03;  // for a way that is none of one twist, and between its steps
   const double spare = kSpare_m * study.scale;
   const Footprint footprint = footprint_of(problem, study);
-  std::vector<bool> touched;
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    touched.push_back(nearest_to(patch, study.trials[i].X_WS, motion_of(study, i), footprint) <
-                      patch[2] + spare);
+  std::vector<std::uint32_t> touched;
+  for (std::uint32_t i = 0; i < study.size(); ++i) {
+    const double nearest = nearest_to(patch, study.trials[i].X_WS, motion_of(study, i), footprint);
+    if (nearest < patch[2] + spare) touched.push_back(i);
   }
   return touched;
 }

@@ -70,6 +70,16 @@ Status within_bounds(const Problem& problem, const Overrides& at) {
 
 }  // namespace
 
+void set_values(const ParameterTable& table, const std::map<std::string, double>& values,
+                Overrides* at) {
+  for (const auto& [key, value] : values) (*at)[table.row(key)] = value;
+}
+
+double value_at(const Problem& problem, const Overrides& at, std::size_t row) {
+  const auto found = at.find(row);
+  return found != at.end() ? found->second : problem.values[row];
+}
+
 Predictor::Predictor(Farm& farm, const Problem& problem)
     : farm_(farm), problem_(problem), hash_(farm.add_problem(to_proto(problem))) {
   by_condition_.resize(problem.log.trials.size());

@@ -18,6 +18,11 @@ namespace gapfarm {
 // Parameter rows that differ from the problem's values.
 using Overrides = std::map<std::size_t, double>;
 
+// Puts these values in, by their keys of the table.
+void set_values(const ParameterTable& table, const std::map<std::string, double>& values,
+                Overrides* at);
+double value_at(const Problem& problem, const Overrides& at, std::size_t row);
+
 struct PredictionRequest {
   Overrides at;
   std::vector<std::uint32_t> trials;  // ascending; empty: all

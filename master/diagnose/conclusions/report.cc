@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/effects/catalogue.h"
 #include "common/math/statistics.h"
@@ -27,14 +28,9 @@ void fill_gap(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   const std::vector<std::size_t> folds = of.subject.folds(refit.judged.named.study());
   const RootMeanSquare tuned = held_out_error(base, folds);
   const RootMeanSquare last = held_out_error(model, folds);
-  double position = 0, heading = 0;
-  const auto n = static_cast<double>(model.study.size());
-  for (const Eigen::Matrix3d& cov : model.study.covariances()) {
-    position += (cov(0, 0) + cov(1, 1)) / n;
-    heading += cov(2, 2) / n;
-  }
-  d->position_mm = {tuned.position_mm, last.position_mm, 1e3 * std::sqrt(position)};
-  d->heading_mrad = {tuned.heading_mrad, last.heading_mrad, 1e3 * std::sqrt(heading)};
+  const RootMeanSquare noise = error_of_noise(model.study);
+  d->position_mm = {tuned.position_mm, last.position_mm, noise.position_mm};
+  d->heading_mrad = {tuned.heading_mrad, last.heading_mrad, noise.heading_mrad};
 }
 
 void fill_where(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
@@ -73,11 +69,7 @@ Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explan
   const ParameterTable& table = of.table();
   const EffectCandidate& chosen = named.chosen[k];
   const std::string& own = chosen.effect();
-  std::vector<const Signature*> others;
-  for (std::size_t j = 0; j < named.chosen.size(); ++j) {
-    if (j != k) others.push_back(&named.chosen[j].signature);
-  }
-  const Regression explained = catalogue.with(others);
+  const Regression explained = catalogue.with({}, named.chosen, k);
   ASSIGN_OR_RETURN(auto candidates, catalogue.candidates(explained, {}));
   CompetingCauses alternatives;
   for (const EffectCandidate& c : candidates) {
@@ -86,9 +78,7 @@ Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explan
     if (!alias && name != kind_of(own)) continue;
     Overrides at = named.study().base;
     if (alias) {
-      for (const auto& [key, value] : start_values(named.study(), explained, c.signature)) {
-        at[table.row(key)] = value;
-      }
+      set_values(table, start_values(named.study(), explained, c.signature), &at);
     } else {
       for (const auto& [row, value] : named.estimates->at) {
         if (table[row].effect == own) at[row] = value;
@@ -107,16 +97,13 @@ Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explan
 std::string place_text(const DiagnosisRequest& of, const Signature& second,
                        const std::vector<const char*>& keys) {
   Overrides at;
-  for (const auto& [key, value] : second.fixed) at[of.table().row(key)] = value;
-  std::string place;
-  for (const char* key : keys) {
+  set_values(of.table(), second.fixed, &at);
+  return joined(keys, ", ", [&](const std::string& key) {
     const std::size_t row = of.table().row(second.effect + "." + key);
     const std::string& full = of.table()[row].key;
     const double value = second.fixed.at(full) + of.frame_of(full, at);
-    place += std::string(place.empty() ? "" : ", ") + key + " " +
-             of.table().format(row, std::round(value * 1e3) / 1e3);
-  }
-  return place;
+    return key + " " + of.table().format(row, std::round(value * 1e3) / 1e3);
+  });
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/places/seam.h"
+#include "master/diagnose/steps/step_parts.h"
 #include "master/infer/certificate.h"
 
 namespace gapfarm::steps {
@@ -18,14 +19,9 @@ namespace {
 
 constexpr int kBootstraps = 400;
 
-std::vector<double> difference(std::vector<double> values, const std::vector<double>& less) {
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] -= less[i];
-  return values;
-}
-
 // Of every trial, by a nested fit over the one before.
 std::vector<double> gained_by(const Refit& refit, std::size_t nested) {
-  return difference(refit.nested[nested].scores, refit.nested[nested - 1].scores);
+  return gains_over(refit.nested[nested].scores, refit.nested[nested - 1].scores);
 }
 
 // With the gap that it closes, and 90 % of how sure that is.
@@ -46,10 +42,7 @@ Deviation deviation_of(const JointFit& fit, const Study& study, const Eigen::Mat
   Eigen::MatrixXd slopes = fit.jacobian;
   study.drop_ignored(slopes);
   Eigen::MatrixXd information = infer::information(slopes, nuisances);
-  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const BaseParameter& p = study.base_parameters[k];
-    information(k, k) += 1 / std::pow(p.prior_log_sd * study.base.at(p.row), 2);
-  }
+  add_base_prior(study, fit, &information);
   const Eigen::VectorXd least = infer::least_deviations(information);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
     const FittedParameter& p = fit.parameters[k];
@@ -159,7 +152,7 @@ NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit, const F
   if (contains(named.first, found.effect, &Signature::effect)) {
     gained = gained_by(refit, 1);
   } else if (!found.scores.empty()) {
-    gained = difference(found.scores, refit.nested.back().scores);
+    gained = gains_over(found.scores, refit.nested.back().scores);
   }
   if (gained.empty()) {
     // The gain is over all that the readings show; of the gap it can close what the means left.
@@ -182,6 +175,16 @@ RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
   for (const Eigen::Vector3d& r : residuals) {
     position += r.head<2>().squaredNorm() / static_cast<double>(residuals.size());
     heading += r[2] * r[2] / static_cast<double>(residuals.size());
+  }
+  return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
+}
+
+RootMeanSquare error_of_noise(const Study& study) {
+  double position = 0, heading = 0;
+  const auto n = static_cast<double>(study.size());
+  for (const Eigen::Matrix3d& cov : study.covariances()) {
+    position += (cov(0, 0) + cov(1, 1)) / n;
+    heading += cov(2, 2) / n;
   }
   return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
 }

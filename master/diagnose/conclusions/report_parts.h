@@ -25,6 +25,8 @@ struct RootMeanSquare {
   double heading_mrad = 0;
 };
 RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals);
+// That chance alone makes.
+RootMeanSquare error_of_noise(const Study& study);
 // Of trials that no fit saw; of one that a fold's linear step would move far beyond the noise,
 // under the fit to all.
 RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::size_t>& folds);

@@ -89,9 +89,7 @@ ParameterValues within_table(const DiagnosisRequest& of, const Overrides& at,
     const std::string claim = p.key + " would be " + plain_number(value) +
                               ", which is beyond its bounds: the models have " +
                               of.table().format(row, values[row]) + ".";
-    if (std::find(cautions->begin(), cautions->end(), claim) == cautions->end()) {
-      cautions->push_back(claim);
-    }
+    if (!contains(*cautions, claim)) cautions->push_back(claim);
   }
   return values;
 }
@@ -135,9 +133,8 @@ std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Scree
 std::vector<std::string> not_looked_for(const DiagnosisRequest& of) {
   std::vector<std::string> sentences;
   std::string lacking;
-  const std::span<const Effect> known = of.table().effects();
   for (const Effect& effect : of.problem.external ? srv1_effects() : std::span<const Effect>{}) {
-    const bool there = contains(known, effect.name, &Effect::name);
+    const bool there = contains(of.table().effects(), effect.name, &Effect::name);
     if (!there) lacking += (lacking.empty() ? "" : ", ") + effect.name;
   }
   if (!lacking.empty()) {

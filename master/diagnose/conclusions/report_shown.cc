@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "master/diagnose/conclusions/report_parts.h"
@@ -18,21 +19,11 @@ constexpr double kHardlyMoved = 0.8;  // of the prior's spread: the data add nex
 constexpr double kShownInterval_s = 0.05;
 constexpr std::size_t kMostSamples = 40;  // of a path that is shown
 
-// Prior of a fitted base parameter, in its own unit.
-double prior_sd(const Study& study, std::size_t k) {
-  const BaseParameter& p = study.base_parameters[k];
-  return p.prior_log_sd * std::abs(study.base.at(p.row));
-}
-
 // Covariance of the fit's parameters, for noise of unit variance.
 Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
   if (fit.parameters.empty()) return {};
   Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
-  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const double sd = prior_sd(study, k);
-    const auto i = static_cast<Eigen::Index>(k);
-    if (sd > 0) normal(i, i) += 1 / (sd * sd);
-  }
+  add_base_prior(study, fit, &normal);
   const Eigen::VectorXd curvatures = axes_of_symmetric(normal).values;
   const double rounding = std::numeric_limits<double>::epsilon() *
                           static_cast<double>(normal.rows()) * curvatures.maxCoeff();
@@ -88,9 +79,7 @@ std::vector<PathSample> shown_path(const std::vector<PathSample>& path, const Po
 std::vector<ShownDrive> drives_to_show(const std::vector<DiagnosedTrial>& trials) {
   std::vector<std::string> commands;
   for (const DiagnosedTrial& t : trials) {
-    if (std::find(commands.begin(), commands.end(), t.command) == commands.end()) {
-      commands.push_back(t.command);
-    }
+    if (!contains(commands, t.command)) commands.push_back(t.command);
   }
   std::vector<ShownDrive> drives;
   std::set<std::size_t> taken;
@@ -216,7 +205,7 @@ void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisRe
       row->lo = std::max(row->after - half, row->lower);
       row->hi = std::min(row->after + half, row->upper);
     }
-    if (p.standard_error > kHardlyMoved * prior_sd(study, k)) {
+    if (p.standard_error > kHardlyMoved * prior_sd(study, study.base_parameters[k])) {
       row->note = "the data hardly move it: it stays near the config's value";
     }
   }

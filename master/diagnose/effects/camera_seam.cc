@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/places/seam.h"
 
@@ -11,8 +12,8 @@ namespace {
 std::vector<Signature> lines(const Study& study) {
   std::vector<Signature> found;
   for (int axis = 0; axis < 2; ++axis) {
-    std::vector<double> places;
-    for (const ResidualTrial& t : study.trials) places.push_back(axis == 0 ? t.X_WS.x : t.X_WS.y);
+    std::vector<double> places = mapped(
+        study.trials, [&](const ResidualTrial& t) { return axis == 0 ? t.X_WS.x : t.X_WS.y; });
     std::sort(places.begin(), places.end());
     const double lower = places[places.size() * 8 / 100], upper = places[places.size() * 92 / 100];
     for (int k = 0; upper > lower && k < 29; ++k) {

@@ -4,14 +4,11 @@
 namespace gapfarm {
 namespace {
 
-bool contaminated_with_session(const ResidualTrial&) { return false; }
-
 const SpreadRow kSessionSpread = {
     .effect = "session_gain",
     .least_gain = 20,  // as of a second one of a kind
     .fit = fit_session_gains,
     .scores = scores_with_session_gains,
-    .contaminates = contaminated_with_session,
     .by_session = true,
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "common/base/ranges.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/fit/slopes.h"
@@ -18,11 +19,7 @@ class BlockBuilder {
  public:
   explicit BlockBuilder(const Study& study) : study_(study) {}
 
-  Values values(const Feature& feature) const {
-    Values v;
-    for (const ResidualTrial& t : study_.trials) v.push_back(feature(t));
-    return v;
-  }
+  Values values(const Feature& feature) const { return mapped(study_.trials, feature); }
 
   // The feature by how far the trial's command takes the robot.
   Values by_path(const Feature& feature) const {

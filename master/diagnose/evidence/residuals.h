@@ -49,6 +49,9 @@ struct ResidualTrial {
   PushSpread spread;
 };
 
+// Change of the predicted end for a unit change of both sides' gain.
+inline Eigen::Vector3d of_gain(const ResidualTrial& trial) { return trial.left + trial.right; }
+
 // Of the measured end, were it predicted there.
 Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/noise.h"
@@ -18,18 +19,13 @@ constexpr double kFarFromSession = 11.5;   // squared distance with 3 degrees of
 constexpr double kLeastSpread = 0.004, kMostSpread = 0.3, kSpreadStep = 1.08;
 constexpr int kReweightings = 3;
 
-Eigen::Vector3d of_gain(const ResidualTrial& trial) { return trial.left + trial.right; }
-
 // Gains that are no session's: a column each.
 Eigen::MatrixXd common_gains(const Study& study) {
   std::vector<std::vector<double>> weights = drive_classes(study);
-  std::vector<double> path, time;
-  for (const ResidualTrial& t : study.trials) {
-    path.push_back(study.cells[t.cell].path);
-    time.push_back(t.context.session_time_s / 60);
-  }
-  weights.push_back(std::move(path));
-  weights.push_back(std::move(time));
+  weights.push_back(
+      mapped(study.trials, [&](const ResidualTrial& t) { return study.cells[t.cell].path; }));
+  weights.push_back(
+      mapped(study.trials, [](const ResidualTrial& t) { return t.context.session_time_s / 60; }));
   Eigen::MatrixXd columns(3 * study.size(), weights.size());
   for (std::size_t k = 0; k < weights.size(); ++k) {
     std::vector<Eigen::Vector3d> d;
@@ -119,9 +115,7 @@ std::vector<std::size_t> trials_of_sessions(const Study& study) {
 }
 
 Eigen::VectorXd whitened_gains(const Study& study) {
-  std::vector<Eigen::Vector3d> d;
-  for (const ResidualTrial& t : study.trials) d.push_back(of_gain(t));
-  return study.whiten(d);
+  return study.whiten(mapped(study.trials, of_gain));
 }
 
 // The sessions' median gains, to begin with.

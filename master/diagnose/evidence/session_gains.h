@@ -29,8 +29,8 @@ struct SpreadRow {
   // Log scores (nats) of every trial that misses its prediction so far, the effect foreseen.
   std::vector<double> (*scores)(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                                 const SpreadFit& fit, double outlier_share);
-  bool (*contaminates)(
-      const ResidualTrial& trial);  // whether it may be one that the effect strikes
+  // Whether it may be one that the effect strikes; null: it strikes no single ones.
+  bool (*contaminates)(const ResidualTrial& trial) = nullptr;
   // Each session has a gain of its own, which no statement about means may use, rather
   // than trials that show nothing of means.
   bool by_session = false;

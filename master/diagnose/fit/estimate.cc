@@ -6,7 +6,6 @@
 
 #include "common/base/try.h"
 #include "common/math/algebra.h"
-#include "common/score/density.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/places/seam.h"
@@ -54,10 +53,7 @@ std::vector<FittedParameter> parameters_of(const Study& study, const Overrides& 
 Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
   ASSIGN_OR_RETURN(auto ends, predictor.ends({{fit->at, {}}}));
   fit->ends = std::move(ends.front());
-  fit->residuals.clear();
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    fit->residuals.push_back(residual_of(study.trials[i], fit->ends[i]));
-  }
+  fit->residuals = study.residuals_about(fit->ends);
   return {};
 }
 
@@ -130,11 +126,11 @@ double scaled_step(const Parameter& row, double from, double to) {
 
 // Prior of the base parameters about the tuned base, in their own units.
 void add_prior(const Study& study, const JointFit& fit, StepEquations* normal) {
-  const std::vector<BaseParameter>& base = study.base_parameters;
+  add_base_prior(study, fit, &normal->matrix);
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const double sd = base[k].prior_log_sd * study.base.at(base[k].row);
-    normal->matrix(k, k) += 1 / (sd * sd);
-    normal->right[k] += (study.base.at(base[k].row) - fit.parameters[k].value) / (sd * sd);
+    const BaseParameter& p = study.base_parameters[k];
+    const double sd = prior_sd(study, p);
+    normal->right[k] += (study.base.at(p.row) - fit.parameters[k].value) / (sd * sd);
   }
   // Keeps a direction that the data do not see where it is.
   const double scale = normal->matrix.diagonal().maxCoeff();
@@ -247,6 +243,17 @@ Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
 
 bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); }
 
+double prior_sd(const Study& study, const BaseParameter& p) {
+  return p.prior_log_sd * study.base.at(p.row);
+}
+
+void add_base_prior(const Study& study, const JointFit& fit, Eigen::MatrixXd* information) {
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const double sd = prior_sd(study, study.base_parameters[k]);
+    (*information)(k, k) += 1 / (sd * sd);
+  }
+}
+
 StepEquations step_equations(const Study& study, const JointFit& fit) {
   const Eigen::VectorXd z = study.whiten(fit.residuals);
   return equations_of(study, fit, z, weights_of(study, fit, z));
@@ -276,10 +283,9 @@ double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
         std::min(d2, kFarSquared) +
         kFarSquared * (fit.loss == Loss::kHuber ? 2 * (std::sqrt(beyond) - 1) : std::log(beyond));
   }
-  const std::vector<BaseParameter>& base = study.base_parameters;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const double tuned = study.base.at(base[k].row);
-    const double away = (fit.parameters[k].value / tuned - 1) / base[k].prior_log_sd;
+    const BaseParameter& p = study.base_parameters[k];
+    const double away = (fit.parameters[k].value / study.base.at(p.row) - 1) / p.prior_log_sd;
     sum += away * away;
   }
   return sum;
@@ -288,12 +294,11 @@ double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
                                            const Signature& signature) {
   // Coefficients of the columns, given everything else.
-  const Eigen::VectorXd data = others.left();
-  Eigen::MatrixXd columns = signature.columns;
-  const Eigen::MatrixXd normal = columns.transpose() * columns;
-  Eigen::MatrixXd ridged = normal;
+  const Eigen::MatrixXd& columns = signature.columns;
+  Eigen::MatrixXd ridged = columns.transpose() * columns;
   ridged.diagonal() *= 1 + 1e-6;
-  return values_at(study, others, signature, solve_symmetric(ridged, columns.transpose() * data));
+  return values_at(study, others, signature,
+                   solve_symmetric(ridged, columns.transpose() * others.left()));
 }
 
 std::map<std::string, double> values_at(const Study& study, const Regression& others,
@@ -372,11 +377,6 @@ std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vecto
                               double outlier_share) {
   return predictive_scores(study.trials, residuals, study.predictive_noise(), *study.subject,
                            outlier_share);
-}
-
-std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
-                                    const std::vector<std::size_t>& fold_of, double outlier_share) {
-  return scores_of(study, held_out_residuals(study, fit, fold_of), outlier_share);
 }
 
 std::vector<std::size_t> folds_of(const Study& study) {

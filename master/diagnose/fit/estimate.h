@@ -42,6 +42,11 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds,
                              Loss loss = Loss::kHuber);
 
+// Standard deviation of a fitted base parameter's prior, in its own unit.
+double prior_sd(const Study& study, const BaseParameter& p);
+// What that says of them, beside what the log does.
+void add_base_prior(const Study& study, const JointFit& fit, Eigen::MatrixXd* information);
+
 // Of a step that makes the misfit smaller, by a fit's derivatives, without nuisances.
 struct StepEquations {
   Eigen::MatrixXd matrix;
@@ -75,12 +80,8 @@ std::map<std::string, double> values_at(const Study& study, const Regression& ot
 std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                               double outlier_share);
 
-// Log scores (nats) of every trial, predicted from a fit to the other folds' trials alone: the
-// joint fit's linearisation is solved again without the fold.
-std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
-                                    const std::vector<std::size_t>& fold_of, double outlier_share);
-
-// Residuals of every trial under those fits.
+// Residuals of every trial, predicted from a fit to the other folds' trials alone: the joint fit's
+// linearisation is solved again without the fold.
 std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
                                                 const std::vector<std::size_t>& fold_of);
 

@@ -8,6 +8,7 @@
 #include <set>
 #include <tuple>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "master/diagnose/fit/slopes.h"
 
@@ -117,11 +118,6 @@ double misfit_size(const Misfit& misfit, double path, double speed_m_s) {
   return (misfit.fixed + misfit.growing * path) * speed_m_s / kMeasuredSpeed_m_s;
 }
 
-void add_column(const Study& study, const std::vector<Eigen::Vector3d>& values, double prior,
-                std::vector<Eigen::VectorXd>* columns) {
-  columns->push_back(prior * study.whiten(values));
-}
-
 // A misfit of one kind of drive at one level and duration.
 void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
   std::set<std::tuple<MotionKind, double, double>> conditions;
@@ -140,7 +136,8 @@ void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
         const bool mirrors = misfit.component != 0 || kind == MotionKind::kStraight;
         values[i][misfit.component] = mirrors ? c.mirror : 1;
       }
-      add_column(study, values, misfit_size(misfit, level * duration_s, study.speed_m_s), columns);
+      columns->push_back(misfit_size(misfit, level * duration_s, study.speed_m_s) *
+                         study.whiten(values));
     }
   }
 }
@@ -322,24 +319,21 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
   }
   ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
 
-  std::vector<Pose> middle;
-  for (const ResidualTrial& t : study.trials) middle.push_back(t.X_WP);
+  const std::vector<Pose> middle = study.predicted_ends();
   std::vector<Eigen::VectorXd> columns;
-  std::vector<Eigen::Vector3d> faster;
-  for (const ResidualTrial& t : study.trials) faster.push_back(t.left + t.right);
-  add_column(study, faster, 0.3, &columns);
+  columns.push_back(0.3 * study.whiten(mapped(study.trials, of_gain)));
   for (std::size_t r = 0; r < study.drive.retuned.size(); ++r) {
     const RetunedParameter& parameter = study.drive.retuned[r];
     const auto slope = central_slope(middle, ends[2 * r], ends[2 * r + 1], kStep);
     if (slope) {
-      add_column(study, *slope, parameter.prior_sd, &columns);
+      columns.push_back(parameter.prior_sd * study.whiten(*slope));
     } else {
       predictor.exclude("retuning " + predictor.problem().table()[parameter.row].key);
     }
   }
   // Motors of some hundredths of a second are part of any robot.
   if (lag && ends.back()) {
-    add_column(study, differences(study, *ends.back(), kLagStep), 0.02, &columns);
+    columns.push_back(0.02 * study.whiten(differences(middle, *ends.back(), kLagStep)));
   }
   if (study.free_commands) {
     for (Eigen::VectorXd& column : smooth_misfits(study)) columns.push_back(std::move(column));

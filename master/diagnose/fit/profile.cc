@@ -105,10 +105,8 @@ class Profile {
       Aside& aside = *asides[j];
       aside.move.resize(0);
       if (!ends[j]) continue;
-      for (std::size_t i = 0; i < study_.size(); ++i) {
-        tried[j].residuals[i] = residual_of(study_.trials[i], (*ends[j])[i]);
-      }
       tried[j].ends = *ends[j];
+      tried[j].residuals = study_.residuals_about(*ends[j]);
       const double misfit = misfit_of(study_, tried[j], none_);
       if (misfit >= aside.misfit) continue;
       aside.misfit = misfit;

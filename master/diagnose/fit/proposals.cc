@@ -36,9 +36,8 @@ double least_gain_of(const std::string& effect, const Study& study, double expla
 // Whether there may be one in the table, and it is none that is there or omitted.
 bool Proposals::may_be_second(const std::string& second,
                               const std::set<std::string>& without) const {
-  const std::span<const Effect> known = study_->table->effects();
   return !without.count(second) && !excluded_.count(second) &&
-         contains(known, second, &Effect::name);
+         contains(study_->table->effects(), second, &Effect::name);
 }
 
 // Empty: not at all.
@@ -111,9 +110,14 @@ Result<EffectCandidate> Proposals::again(const Regression& explained,
   return best.empty() ? EffectCandidate{} : std::move(best.front());
 }
 
-Regression Proposals::with(const std::vector<const Signature*>& signatures) const {
+Regression Proposals::with(const std::vector<Signature>& first,
+                           const std::vector<EffectCandidate>& chosen,
+                           std::optional<std::size_t> but) const {
   Regression r = base_;
-  for (const Signature* s : signatures) r.add(s->columns);
+  for (const Signature& s : first) r.add(s.columns);
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    if (k != but) r.add(chosen[k].signature.columns);
+  }
   return r;
 }
 
@@ -131,11 +135,7 @@ bool Proposals::is_new(const std::vector<Signature>& first,
   }
   if (candidate.gain > kSecondShare * explained) return true;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    std::vector<const Signature*> others = mapped(first, [](const Signature& s) { return &s; });
-    for (std::size_t j = 0; j < chosen.size(); ++j) {
-      if (j != i) others.push_back(&chosen[j].signature);
-    }
-    const Regression r = with(others);
+    const Regression r = with(first, chosen, i);
     if (cosine(r.explained(chosen[i].signature.columns), r.explained(candidate.signature.columns)) >
         kSecondAlias) {
       return false;

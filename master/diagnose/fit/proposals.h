@@ -78,8 +78,9 @@ class Proposals {
   // Data that are as if the predictions of what was chosen were linear in its columns.
   void restart(const Eigen::VectorXd& data) { base_.restart(data); }
   const Regression& nothing_explained() const { return base_; }
-  // The nuisances and these signatures.
-  Regression with(const std::vector<const Signature*>& signatures) const;
+  // The nuisances, what comes first and what was chosen, but for one of these.
+  Regression with(const std::vector<Signature>& first, const std::vector<EffectCandidate>& chosen,
+                  std::optional<std::size_t> but = std::nullopt) const;
 
  private:
   bool may_be_second(const std::string& second, const std::set<std::string>& without) const;

@@ -31,8 +31,7 @@ std::vector<Probe> probes_of(const EffectDiagnosis& row, const Study& study) {
 }
 
 bool has_effect(const Study& study, const std::string& name) {
-  const std::span<const Effect> known = study.table->effects();
-  return contains(known, name, &Effect::name);
+  return contains(study.table->effects(), name, &Effect::name);
 }
 
 bool one_condition(const Study& study) {
@@ -48,9 +47,7 @@ Signature plain_signature(const EffectDiagnosis& row, const Study& study, Probed
                           std::span<const Probe> probes) {
   Signature s;
   s.effect = row.effect;
-  std::vector<Eigen::VectorXd> columns;
-  for (const auto& d : slopes) columns.push_back(study.whiten(d));
-  s.columns = stack(columns);
+  s.columns = stack(mapped(slopes, [&](const auto& d) { return study.whiten(d); }));
   s.penalty = 0.5 * static_cast<double>(slopes.size());
   for (const Probe& probe : probes) {
     if (probe.plus.size() == 1) s.parameters.push_back(probe.plus.begin()->first);
@@ -126,20 +123,17 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
 
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
                                                 const std::vector<Patch>& places) {
-  std::vector<Pose> ends_without = mapped(study.trials, &ResidualTrial::X_WP);
-  ASSIGN_OR_RETURN(const auto without, slope_point(predictor, study, study.base, ends_without));
+  ASSIGN_OR_RETURN(const auto without,
+                   slope_point(predictor, study, study.base, study.predicted_ends()));
   std::vector<PredictionRequest> requests;
   std::vector<std::map<std::string, double>> values;
   for (const Patch& place : places) {
     PredictionRequest request;
-    const std::vector<bool> touched = study.subject->touched_by(predictor.problem(), study, place);
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      if (touched[i]) request.trials.push_back(static_cast<std::uint32_t>(i));
-    }
+    request.trials = study.subject->touched_by(predictor.problem(), study, place);
     values.push_back(patch_values(place));
     request.at = without.at;
     request.headings = without.headings;
-    for (const auto& [key, value] : values.back()) request.at[study.table->row(key)] = value;
+    set_values(*study.table, values.back(), &request.at);
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));
   }

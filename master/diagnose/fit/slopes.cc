@@ -11,14 +11,6 @@ namespace {
 // In the order in which they are tried, in steps.
 constexpr double kTries[] = {1, -1, 0.1, -0.1};
 
-Slope slope_between(const std::vector<Pose>& from, const std::vector<Pose>& to, double step) {
-  Slope slope;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    slope.push_back(local_difference(from[i], to[i]) / step);
-  }
-  return slope;
-}
-
 }  // namespace
 
 Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
@@ -27,10 +19,7 @@ Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const O
   const std::uint32_t headings = study.subject->slope_headings;
   if (rate == 0) return SlopePoint{at, ends};
   const std::size_t row = study.table->row("step_rate");
-  const auto own = at.find(row);
-  if ((own != at.end() ? own->second : predictor.problem().values[row]) <= rate) {
-    return SlopePoint{at, ends};
-  }
+  if (value_at(predictor.problem(), at, row) <= rate) return SlopePoint{at, ends};
   SlopePoint coarse{at, {}, headings};
   coarse.at[row] = rate;
   ASSIGN_OR_RETURN(auto there, predictor.attempt({{coarse.at, {}, headings}}));
@@ -59,7 +48,7 @@ Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const 
     ASSIGN_OR_RETURN(const auto moved, predictor.attempt(tries));
     for (std::size_t j = 0; j < of.size(); ++j) {
       if (!moved[j]) continue;
-      slopes[of[j]] = slope_between(from.ends, *moved[j], share * requests[of[j]].step);
+      slopes[of[j]] = differences(from.ends, *moved[j], share * requests[of[j]].step);
     }
   }
   return slopes;
@@ -68,9 +57,9 @@ Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const 
 std::optional<Slope> central_slope(const std::vector<Pose>& middle,
                                    const std::optional<std::vector<Pose>>& up,
                                    const std::optional<std::vector<Pose>>& down, double step) {
-  if (up && down) return slope_between(*down, *up, 2 * step);
-  if (up) return slope_between(middle, *up, step);
-  if (down) return slope_between(middle, *down, -step);
+  if (up && down) return differences(*down, *up, 2 * step);
+  if (up) return differences(middle, *up, step);
+  if (down) return differences(middle, *down, -step);
   return std::nullopt;
 }
 
@@ -96,7 +85,7 @@ bool mirrors(const Probe& probe) { return probe.plus.size() == 1 && probe.minus.
 Overrides base_with(const Predictor& predictor, const Study& study,
                     const std::map<std::string, double>& values) {
   Overrides overrides = study.base;
-  for (const auto& [key, value] : values) overrides[predictor.problem().table().row(key)] = value;
+  set_values(predictor.problem().table(), values, &overrides);
   return overrides;
 }
 
@@ -109,21 +98,22 @@ Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor
     if (!probe.minus.empty()) requests.push_back({base_with(predictor, study, probe.minus), {}});
   }
   ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
+  const std::vector<Pose> middle = study.predicted_ends();
   std::vector<std::vector<Eigen::Vector3d>> all;
   std::size_t next = 0;
   for (const Probe& probe : probes) {
     const auto& plus = ends[next++];
     std::vector<Eigen::Vector3d>& d = all.emplace_back();
     if (probe.minus.empty()) {
-      if (plus) d = differences(study, *plus, probe.scale);
+      if (plus) d = differences(middle, *plus, probe.scale);
       continue;
     }
     const auto& minus = ends[next++];
     const bool both = plus && minus, mirrored = mirrors(probe);
-    if (plus && (both || mirrored)) d = differences(study, *plus, probe.scale / (both ? 1 : 2));
+    if (plus && (both || mirrored)) d = differences(middle, *plus, probe.scale / (both ? 1 : 2));
     if (!minus || (!both && !mirrored)) continue;
     const std::vector<Eigen::Vector3d> below =
-        differences(study, *minus, probe.scale / (both ? 1 : 2));
+        differences(middle, *minus, probe.scale / (both ? 1 : 2));
     if (d.empty()) d.assign(study.size(), Eigen::Vector3d::Zero());
     for (std::size_t i = 0; i < d.size(); ++i) d[i] -= below[i];
   }

@@ -8,6 +8,7 @@
 #include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
+#include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/study.h"
@@ -45,14 +46,6 @@ std::vector<CellResidual> cell_residuals(const Study& study) {
     for (int k = 0; k < 3; ++k) cells[c].median[k] = median(values[c][k]);
   }
   return cells;
-}
-
-void set_predictions(const std::vector<Pose>& ends, Study* study) {
-  for (std::size_t i = 0; i < study->size(); ++i) {
-    ResidualTrial& t = study->trials[i];
-    t.X_WP = ends[i];
-    t.residual = residual_of(t, t.X_WP);
-  }
 }
 
 // From both sides faster, and the right side faster than the left: each side's derivative.
@@ -93,11 +86,6 @@ struct TuningStep {
   bool of_all = true;  // no trial was omitted
 };
 
-struct BaseNormal {
-  Eigen::MatrixXd matrix;
-  Eigen::VectorXd right;
-};
-
 // Soft L1 beyond three standard errors: what the base cannot fit must not rule.
 double soft_weight(const Eigen::Vector3d& z) { return 1 / std::sqrt(1 + z.squaredNorm() / 27); }
 
@@ -112,9 +100,9 @@ Eigen::MatrixXd log_slopes(const std::vector<Slope>& slopes, std::size_t trial,
 }
 
 // By the cells' medians.
-BaseNormal normal_of_cells(const Study& study, const std::vector<Slope>& slopes, const Slope& both,
-                           Eigen::Index p, int round, bool* of_all) {
-  BaseNormal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
+StepEquations normal_of_cells(const Study& study, const std::vector<Slope>& slopes,
+                              const Slope& both, Eigen::Index p, int round, bool* of_all) {
+  StepEquations normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
   const std::vector<CellResidual> cells = cell_residuals(study);
   std::vector<double> turns =
       mapped(cells, [&](const CellResidual& cell) { return both[cell.trial][2]; });
@@ -143,11 +131,11 @@ BaseNormal normal_of_cells(const Study& study, const std::vector<Slope>& slopes,
 
 // By every trial, beside the misfits that neighbouring commands have in common; their coefficients
 // come after the parameters.
-BaseNormal normal_of_trials(const Study& study, const std::vector<Slope>& slopes, Eigen::Index p,
-                            int round, bool* of_all) {
+StepEquations normal_of_trials(const Study& study, const std::vector<Slope>& slopes, Eigen::Index p,
+                               int round, bool* of_all) {
   const std::vector<Eigen::VectorXd> misfits = smooth_misfits(study);
   const auto q = static_cast<Eigen::Index>(misfits.size());
-  BaseNormal normal{Eigen::MatrixXd::Zero(p + q, p + q), Eigen::VectorXd::Zero(p + q)};
+  StepEquations normal{Eigen::MatrixXd::Zero(p + q, p + q), Eigen::VectorXd::Zero(p + q)};
   normal.matrix.diagonal().tail(q).setOnes();
   std::vector<double> turns;
   for (std::size_t i = 0; i < study.size(); ++i) {
@@ -298,7 +286,7 @@ Result<Slope> both_sides(Predictor& predictor, const std::vector<Slope>& slopes,
 
 // The tuned base's ends and derivatives.
 Status settle(Predictor& predictor, const std::vector<Pose>& ends, Study* study) {
-  set_predictions(ends, study);
+  study->use_predicted_ends(ends);
   ASSIGN_OR_RETURN(const auto turned,
                    predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}},
                                       {with_asymmetry(predictor, *study, -kGainStep), {}}}));
@@ -343,14 +331,14 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
   for (int round = 0; !keep && !parameters.empty() && round < kTuningRounds; ++round) {
     ASSIGN_OR_RETURN(auto ends, predict_base(predictor, simulated, study));
     simulated = study->base;
-    set_predictions(ends, study);
+    study->use_predicted_ends(ends);
     ASSIGN_OR_RETURN(const auto slopes, base_slopes(predictor, parameters, ends, *study));
     ASSIGN_OR_RETURN(const auto both, both_sides(predictor, slopes, ends, study));
     if (study->free_commands) {
       ASSIGN_OR_RETURN(const auto turned,
                        predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}}}));
       if (!turned.front()) return predictor.failed("the base model's sides cannot be parted");
-      const Slope apart = differences(*study, *turned.front(), kGainStep);
+      const Slope apart = differences(ends, *turned.front(), kGainStep);
       for (std::size_t i = 0; i < study->size(); ++i) set_gains(both[i], apart[i], i, study);
     }
     study->use_noise(study->noise);

@@ -6,6 +6,7 @@
 
 #include "common/base/constants.h"
 #include "common/math/statistics.h"
+#include "common/pose/extent.h"
 #include "master/diagnose/fit/free_commands.h"
 
 namespace gapfarm {
@@ -44,9 +45,7 @@ bool near(const Patch& a, const Patch& b, double apart_m) {
 }
 
 double value_of(const Problem& problem, const Study& study, const char* key) {
-  const std::size_t row = problem.table().row(key);
-  const auto tuned = study.base.find(row);
-  return tuned != study.base.end() ? tuned->second : problem.values[row];
+  return value_at(problem, study.base, problem.table().row(key));
 }
 
 // Of a program's robot, whose parameters mean what its author wants: as wide as it turns, as long,
@@ -98,18 +97,15 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study)
 }
 
 void PatchSketch::lay_grid() {
-  Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
-  for (const ResidualTrial& t : study_.trials) {
-    low = low.cwiseMin(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
-    high = high.cwiseMax(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
-  }
-  const double step = std::max(kPatchStep_m * scale_, (high - low).maxCoeff() / kMostSteps);
+  Extent box;
+  for (const ResidualTrial& t : study_.trials) box.add(t.X_WS);
+  const double step = std::max(kPatchStep_m * scale_, box.longer_side() / kMostSteps);
   std::vector<const std::vector<Steps>*> of_grid;
   for (const std::size_t r : kGridRatios) of_grid.push_back(&steps_[r]);
   std::vector<Eigen::Triplet<double>> marks;
   for (double radius_m : kPatchRadii_m) {
-    for (double x = low.x(); x <= high.x(); x += step) {
-      for (double y = low.y(); y <= high.y(); y += step) {
+    for (double x = box.x0; x <= box.x1; x += step) {
+      for (double y = box.y0; y <= box.y1; y += step) {
         const auto of_ratios = columns({x, y, radius_m * scale_, 1}, of_grid);
         for (std::size_t k = 0; k < of_ratios.size(); ++k) {
           if (of_ratios[k].nonZeros() < kFewestMarked) continue;

@@ -50,9 +50,7 @@ Result<double> search_line(Predictor& predictor, const Study& study,
     const int off = k % 2 == 0 ? k / 2 : -(k + 1) / 2;
     const auto at = static_cast<std::size_t>(steps + off);
     if (!ends[at]) continue;
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      tried.residuals[i] = residual_of(study.trials[i], (*ends[at])[i]);
-    }
+    tried.residuals = study.residuals_about(*ends[at]);
     const double misfit = misfit_of(study, tried, nuisances);
     const double least = off == 0 ? misfit : misfit + kWorthMoving;
     if (least >= best) continue;

@@ -128,7 +128,6 @@ bool piece_crosses(const ResidualTrial& trial, const Patch& patch) {
 
 std::vector<infer::Start> push_patch_starts(const Study& study) {
   constexpr double kRadius_m = 0.06, kRatios[] = {0.45, 2};
-  const ParameterTable& table = *study.table;
   std::vector<infer::Start> starts;
   for (Patch place : patch_grid(study, kRadius_m)) {
     infer::Start start;
@@ -140,11 +139,7 @@ std::vector<infer::Start> push_patch_starts(const Study& study) {
     if (start.reach.empty()) continue;
     for (const double ratio : kRatios) {
       place[3] = ratio;
-      start.at.clear();
-      const char* const keys[] = {"x", "y", "radius", "ratio"};
-      for (std::size_t k = 0; k < 4; ++k) {
-        start.at[table.row(std::string(kPatchEffect) + "." + keys[k])] = place[k];
-      }
+      set_values(*study.table, patch_values(place), &start.at);
       starts.push_back(start);
     }
   }

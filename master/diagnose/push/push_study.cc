@@ -77,10 +77,8 @@ Result<std::vector<BaseParameter>> base_of(const Problem& problem, std::span<con
 }
 
 void set_ends(const std::vector<Pose>& ends, Study* study) {
-  for (std::size_t i = 0; i < study->size(); ++i) {
-    ResidualTrial& t = study->trials[i];
-    t.X_WP = ends[i];
-    t.residual = local_difference(t.X_WP, t.X_WE);
+  study->use_predicted_ends(ends);
+  for (ResidualTrial& t : study->trials) {
     const Eigen::Vector2d slid = transform(t.X_WP, t.push.p_RC) - transform(t.X_WS, t.push.p_RC);
     t.spread.slid_m = slid.norm();
     // Half of the whole motion each, along and across the push.
@@ -137,8 +135,7 @@ Status measure_retuning(Predictor& predictor, Study* study) {
   std::vector<PredictionRequest> requests;
   std::vector<double> steps;
   for (const BaseParameter& p : parameters) {
-    const double value =
-        study->base.count(p.row) ? study->base.at(p.row) : predictor.problem().values[p.row];
+    const double value = value_at(predictor.problem(), study->base, p.row);
     const auto at = [&](double log_step) {
       return std::clamp(value * std::exp(log_step), (*study->table)[p.row].lower,
                         (*study->table)[p.row].upper);

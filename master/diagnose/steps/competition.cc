@@ -44,9 +44,9 @@ std::size_t searched_row(const EffectDiagnosis& effect, const SearchedSize& size
 
 std::vector<SearchedSize> searched_of(const EffectDiagnosis& effect) {
   if (!effect.searched.empty()) return effect.searched;
-  std::vector<SearchedSize> sizes;
-  for (const ProbedStep& step : effect.steps) sizes.push_back({step.key, step.size});
-  return sizes;
+  return mapped(effect.steps, [](const ProbedStep& step) {
+    return SearchedSize{step.key, step.size};
+  });
 }
 
 // Two sizes to either side of nothing: every corner of the box, or four directions.
@@ -65,7 +65,7 @@ std::vector<infer::Start> corners(const infer::Space& own) {
 
 infer::Observations observations_of(const DiagnosisRequest& of, const Study& study) {
   infer::Observations all;
-  for (const ResidualTrial& t : study.trials) all.measured.push_back(t.X_WE);
+  all.measured = mapped(study.trials, &ResidualTrial::X_WE);
   all.whitener = study.whitener;
   all.fold = of.subject.folds(study);
   return all;
@@ -166,12 +166,7 @@ std::vector<std::uint32_t> Competition::touched_by(const std::string& effect,
   Signature disc;
   disc.effect = effect;
   for (const auto& [row, value] : at) disc.fixed[of_.table()[row].key] = value;
-  const std::vector<bool> touched = study_.subject->touched_by(of_.problem, study_, patch_of(disc));
-  std::vector<std::uint32_t> trials;
-  for (std::uint32_t i = 0; i < touched.size(); ++i) {
-    if (touched[i]) trials.push_back(i);
-  }
-  return infer::within(scope_, trials);
+  return infer::within(scope_, study_.subject->touched_by(of_.problem, study_, patch_of(disc)));
 }
 
 infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
@@ -183,9 +178,7 @@ infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
   const auto dimensions = static_cast<double>(base_.only(h.coordinates).dimensions());
   h.luck = std::max(0.0, mark.signature.penalty - dimensions / 2);
   infer::Start& start = h.starts.emplace_back();
-  for (const auto& [key, value] : start_values(study_, explained, mark.signature)) {
-    start.at[of_.table().row(key)] = value;
-  }
+  set_values(of_.table(), start_values(study_, explained, mark.signature), &start.at);
   if (!mark.signature.whole) return h;
   // What has a place does nothing elsewhere.
   h.promised = mark.gain;

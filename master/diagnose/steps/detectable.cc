@@ -35,8 +35,7 @@ void add_sizes(const ParameterTable& table, const std::string& effect,
       const Parameter& row = table[table.row(found->first)];
       const double size = std::abs(found->second - row.nominal);
       const bool cut = found->second <= row.lower || found->second >= row.upper;
-      const bool there = std::any_of(sizes->begin(), sizes->end(),
-                                     [&](const auto& entry) { return entry.first == key; });
+      const bool there = contains(*sizes, key, &Sizes::value_type::first);
       if (size > 0 && !cut && !there) sizes->emplace_back(key, size);
     }
   }

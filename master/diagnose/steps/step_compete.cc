@@ -74,8 +74,7 @@ void add_rows(const DiagnosisRequest& of, const std::vector<infer::Hypothesis>& 
     row.gain = std::max(0.0, contender.gain);
     row.p = contender.gain_se > 0 ? normal_above(contender.gain / contender.gain_se) : 1;
     row.estimate = estimate_text(of, contender, row.effect);
-    const auto same = [&](const Screened& r) { return r.effect == row.effect; };
-    if (std::none_of(rows->begin(), rows->end(), same)) rows->push_back(std::move(row));
+    if (!contains(*rows, row.effect, &Screened::effect)) rows->push_back(std::move(row));
   }
 }
 

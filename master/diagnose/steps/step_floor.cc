@@ -42,7 +42,7 @@ std::optional<Tails> tails_of(const DiagnosisRequest& of, const Evidence& eviden
   };
   // What nothing smooth explains, so that structure does not pass for tails.
   Study clean = last.study;
-  for (std::size_t i = 0; i < clean.size(); ++i) clean.trials[i].residual = last.fit.residuals[i];
+  clean.use_residuals(last.fit.residuals);
   const std::vector<Eigen::Vector3d> left = estimate_noise(
       Regression(evidence.nuisances, clean.whitened_residuals()), evidence.blocks, &clean);
   const NoiseFit tailed = fit(clean, left, true);

@@ -193,10 +193,13 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
   return judged;
 }
 
+std::vector<double> gains_over(std::vector<double> scores, const std::vector<double>& others) {
+  for (std::size_t i = 0; i < scores.size(); ++i) scores[i] -= others[i];
+  return scores;
+}
+
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
-  std::vector<double> gains = scores;
-  for (std::size_t i = 0; i < gains.size(); ++i) gains[i] -= others[i];
-  return gains_significantly(gains);
+  return gains_significantly(gains_over(scores, others));
 }
 
 Explanation naming_nothing(Explanation explanation) {

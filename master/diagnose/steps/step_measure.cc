@@ -33,15 +33,11 @@ Result<std::vector<Eigen::Vector3d>> end_velocities(const DiagnosisRequest& of,
   Overrides shorter = study.base;
   shorter[of.table().row("timing_offset.offset")] = -kStep_s;
   ASSIGN_OR_RETURN(const auto ends, of.predictor.attempt({{shorter, {}}}));
-  std::vector<Eigen::Vector3d> velocity;
   if (!ends.front()) {
     of.predictor.exclude("pose_latency");
-    return velocity;
+    return std::vector<Eigen::Vector3d>();
   }
-  for (const Eigen::Vector3d& d : differences(study, *ends.front(), kStep_s)) {
-    velocity.push_back(-d);
-  }
-  return velocity;
+  return differences(study.predicted_ends(), *ends.front(), -kStep_s);
 }
 
 // The gap to the next reading counts from the stop of the motors, the parameter from rest: asks the
@@ -180,8 +176,7 @@ Explanation without(const Explanation& all, const std::vector<bool>& ignored) {
 }
 
 bool DiagnosisRequest::excluded(const std::string& effect) const {
-  const std::span<const Effect> known = table().effects();
-  return contains(options.excluded, effect) || !contains(known, effect, &Effect::name);
+  return contains(options.excluded, effect) || !contains(table().effects(), effect, &Effect::name);
 }
 
 bool DiagnosisRequest::has_paths() const {
@@ -215,9 +210,7 @@ Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanati
   if (!right) return right;
   Signature s;
   s.effect = "pose_latency";
-  std::vector<Eigen::Vector3d> late;
-  for (const ResidualTrial& t : right->study().trials) late.push_back(t.late);
-  s.columns = right->study().whiten(late);
+  s.columns = right->study().whiten(mapped(right->study().trials, &ResidualTrial::late));
   right->first.push_back(std::move(s));
   const LatencyFit& found = right->latency;
   const double age = right->latency_from_rest_s, share = found.share;

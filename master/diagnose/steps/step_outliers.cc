@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/ranges.h"
 #include "common/math/digits.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/conclusions/report_parts.h"
@@ -26,7 +27,8 @@ std::vector<bool> informative_about_slips(const DiagnosisRequest& of, const Expl
     const ResidualTrial& trial = study.trials[i];
     if (!partial.first.empty() && trial.context.moved) informative[i] = false;
     for (const FoundSpread& found : partial.spreads) {
-      if (found.row != nullptr && found.row->contaminates(trial)) informative[i] = false;
+      const auto contaminates = found.row != nullptr ? found.row->contaminates : nullptr;
+      if (contaminates != nullptr && contaminates(trial)) informative[i] = false;
     }
     for (const EffectCandidate& effect : partial.chosen) {
       const Signature& chosen = effect.signature;
@@ -40,12 +42,6 @@ std::vector<bool> informative_about_slips(const DiagnosisRequest& of, const Expl
 std::vector<SlipTrial> judged_by(const SlipFit& slip, const Study& study,
                                  const std::vector<Eigen::Vector3d>& left) {
   return trials_with_slips(study.trials, left, slip, slip.probability * slip.loss / 2, 0);
-}
-
-std::vector<double> slipped_by(const std::vector<SlipTrial>& trials) {
-  std::vector<double> slipped;
-  for (const SlipTrial& t : trials) slipped.push_back(t.slipped);
-  return slipped;
 }
 
 // Whether most outlier trials end nowhere near where a slip would have led them.
@@ -136,7 +132,8 @@ Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
     return partial;
   }
   const std::vector<SlipTrial> judged = judged_by(slip, study, left);
-  const Gathering gathering = gathering_of_slips(study, slipped_by(judged), informative);
+  const Gathering gathering =
+      gathering_of_slips(study, mapped(judged, &SlipTrial::slipped), informative);
   if (are_other_outliers(judged, informative)) {
     partial.odd_drives =
         "Single drives are outliers, most of them to where no slip would have led: nothing "
@@ -169,8 +166,8 @@ std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Expl
       study.unwhiten(studentised(explained_by(catalogue, everywhere), 0.2));
   const std::vector<bool> informative = informative_about_slips(of, everywhere);
   const SlipFit slip = fit_slip(study.trials, left, informative, study.noise);
-  Gathering found =
-      gathering_of_slips(study, slipped_by(judged_by(slip, study, left)), informative);
+  Gathering found = gathering_of_slips(
+      study, mapped(judged_by(slip, study, left), &SlipTrial::slipped), informative);
   if (found.gain < kLeastGathering) return {};
   return found;
 }

@@ -32,6 +32,8 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
                                      const JointFit& fit,
                                      const std::vector<EffectCandidate>& effects);
 
+// Score by score.
+std::vector<double> gains_over(std::vector<double> scores, const std::vector<double>& others);
 // By paired scores: not by chance, but for one case in twenty.
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
@@ -26,6 +28,18 @@ NestedFit nested_fit(const DiagnosisRequest& of, std::string name, JointFit fit,
   return nested;
 }
 
+// Base and these effects where the joint estimate has them, if there is one.
+void use_estimates(const DiagnosisRequest& of, const Explanation& named,
+                   const std::vector<EffectCandidate>& effects, Overrides* start) {
+  if (!named.estimates) return;
+  for (const auto& [row, value] : named.estimates->at) {
+    const std::string& effect = of.table()[row].effect;
+    if (effect.empty() || contains(effects, effect, &EffectCandidate::effect)) {
+      (*start)[row] = value;
+    }
+  }
+}
+
 // Beside effects all of the base moves: on flat floor friction and gauge pass for length and ratio,
 // and stay where they were.
 Study with_whole_base(const DiagnosisRequest& of, Study study) {
@@ -47,21 +61,14 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
                                            BaseParameters::kFitted, none, base_rounds));
     nested.push_back(nested_fit(of, "the tuned base", std::move(fit), logged, logged, folds));
   }
-  std::set<std::string> names;
   std::vector<EffectCandidate> effects;
   const Study beside =
       named.chosen.empty() ? study : with_whole_base(of, study_beside(named, *named.estimates));
   for (std::size_t count = 0; count <= named.chosen.size(); ++count) {
-    if (count > 0) {
-      effects.push_back(named.chosen[count - 1]);
-      names.insert(effects.back().effect());
-    }
+    if (count > 0) effects.push_back(named.chosen[count - 1]);
     const bool alone = count == 0;
     Overrides start = alone && !named.tuned_alone.empty() ? named.tuned_alone : study.base;
-    for (const auto& [row, value] : named.estimates ? named.estimates->at : Overrides{}) {
-      const std::string& effect = of.table()[row].effect;
-      if (!alone && (effect.empty() || names.count(effect))) start[row] = value;
-    }
+    if (!alone) use_estimates(of, named, effects, &start);
     const Study& fitted_in = alone ? study : beside;
     ASSIGN_OR_RETURN(auto fit,
                      fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted,
@@ -71,9 +78,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
     }
     std::string name =
         named.as_logged ? "the tuned base, late readings put right" : "the tuned base";
-    for (std::size_t k = 0; k < effects.size(); ++k) {
-      name += (k == 0 ? ", " : " and ") + effects[k].effect();
-    }
+    if (!alone) name += ", " + joined(effects, " and ", &EffectCandidate::effect);
     Study scored_in = alone ? study : with_whole_base(of, study_beside(named, fit));
     nested.push_back(nested_fit(of, name, std::move(fit), fitted_in, std::move(scored_in), folds));
   }
@@ -99,21 +104,17 @@ Result<Refit> with_correction(const DiagnosisRequest& of, const Screening& scree
   const Explanation& named = refit.judged.named;
   if (refit.judged.unnamed.empty() || of.options.keep_base) return refit;
   const std::vector<EffectCandidate>& effects = refit.judged.unnamed;
-  std::set<std::string> names;
-  for (const EffectCandidate& effect : effects) names.insert(effect.effect());
   const Study& study = named.study();
   Overrides start =
       named.estimates ? study.base : start_of(of, *screening.catalogue, named, effects);
-  for (const auto& [row, value] : named.estimates ? named.estimates->at : Overrides{}) {
-    const std::string& effect = of.table()[row].effect;
-    if (effect.empty() || names.count(effect) > 0) start[row] = value;
-  }
+  use_estimates(of, named, effects, &start);
   auto fit = fit_jointly(of.predictor, study, effects, start, BaseParameters::kFitted,
                          no_nuisances(study), kMostRounds);
   if (!fit && fit.error().code == ErrorCode::kSimulation) return refit;
   if (!fit) return fit.error();
-  std::string name;
-  for (const std::string& effect : names) name += (name.empty() ? "" : " and ") + effect;
+  std::vector<std::string> names = mapped(effects, &EffectCandidate::effect);
+  std::ranges::sort(names);
+  const std::string name = joined(names, " and ");
   Study scored_in = study_beside(named, *fit);
   NestedFit corrected = nested_fit(of, "the tuned base, corrected by " + name, std::move(*fit),
                                    study, std::move(scored_in), folds);
@@ -179,7 +180,7 @@ Result<Refit> with_final_fit(const DiagnosisRequest& of, Refit refit) {
 Study study_beside(const Explanation& named, const JointFit& fit) {
   Study study = named.study();
   if (named.names_outliers()) return study;
-  for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].residual = fit.residuals[i];
+  study.use_residuals(fit.residuals);
   estimate_noise(Regression(named.evidence->nuisances, study.whitened_residuals()),
                  named.evidence->blocks, &study);
   return study;
@@ -187,7 +188,8 @@ Study study_beside(const Explanation& named, const JointFit& fit) {
 
 void score(const DiagnosisRequest& of, const std::vector<std::size_t>& folds, NestedFit* nested) {
   const double share = of.outlier_share();
-  std::vector<double> scores = held_out_scores(nested->study, nested->fit, folds, share);
+  std::vector<double> scores =
+      scores_of(nested->study, held_out_residuals(nested->study, nested->fit, folds), share);
   // The folds' fits are linear steps from this one: what they reach beyond it is not to be had.
   std::vector<double> own = scores_of(nested->study, nested->fit.residuals, share);
   nested->scores = mean(own) < mean(scores) ? std::move(own) : std::move(scores);

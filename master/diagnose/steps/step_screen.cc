@@ -17,10 +17,9 @@ namespace {
 std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evidence,
                                const std::vector<EffectCandidate>& candidates) {
   const ParameterTable& table = of.table();
-  std::vector<Eigen::VectorXd> explained;
-  for (const EffectCandidate& c : candidates) {
-    explained.push_back(evidence.base.explained(c.signature.columns));
-  }
+  std::vector<Eigen::VectorXd> explained = mapped(candidates, [&](const EffectCandidate& c) {
+    return evidence.base.explained(c.signature.columns);
+  });
   std::vector<Screened> rows;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Signature& s = candidates[i].signature;
@@ -35,7 +34,7 @@ std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evide
     }
     Overrides start;
     const auto values = start_values(evidence.study, evidence.base, s);
-    for (const auto& [key, value] : values) start[table.row(key)] = value;
+    set_values(table, values, &start);
     for (const auto& [key, value] : values) {
       if (key.rfind(s.effect + ".", 0) != 0) continue;
       const std::size_t at = table.row(key);
@@ -201,16 +200,12 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
   Relinearised at_estimate{study.whiten(fit.residuals), {}};
   for (std::size_t k = 0; k < effects.size(); ++k) {
     const std::string& name = effects[k].effect();
-    std::vector<Eigen::Vector3d> contribution;
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      contribution.push_back(local_difference((*ends[k])[i], fit.ends[i]));
-    }
     std::vector<Eigen::Index> own;
     for (std::size_t p = 0; p < fit.parameters.size(); ++p) {
       if (table[fit.parameters[p].row].effect == name) own.push_back(static_cast<Eigen::Index>(p));
     }
     Eigen::MatrixXd columns(at_estimate.data.size(), static_cast<Eigen::Index>(own.size()) + 1);
-    columns.col(0) = study.whiten(contribution);
+    columns.col(0) = study.whiten(differences(*ends[k], fit.ends));  // its contribution
     columns.rightCols(columns.cols() - 1) = fit.jacobian(Eigen::all, own);
     at_estimate.data += columns.col(0);
     if (of.subject.effects->row(name).by_contact) columns = split_by_kind(study, columns);
@@ -252,10 +247,7 @@ double sum_of_gains(const std::vector<EffectCandidate>& chosen) {
 }
 
 Regression explained_by(const Proposals& catalogue, const Explanation& explanation) {
-  std::vector<const Signature*> all;
-  for (const Signature& s : explanation.first) all.push_back(&s);
-  for (const EffectCandidate& c : explanation.chosen) all.push_back(&c.signature);
-  return catalogue.with(all);
+  return catalogue.with(explanation.first, explanation.chosen);
 }
 
 double explained_nats(const Proposals& catalogue, const Regression& explained) {
@@ -266,16 +258,8 @@ Overrides start_of(const DiagnosisRequest& of, const Proposals& catalogue,
                    const Explanation& partial, const std::vector<EffectCandidate>& effects) {
   Overrides at = partial.study().base;
   for (std::size_t k = 0; k < effects.size(); ++k) {
-    std::vector<const Signature*> others;
-    for (const Signature& s : partial.first) others.push_back(&s);
-    for (std::size_t j = 0; j < effects.size(); ++j) {
-      if (j != k) others.push_back(&effects[j].signature);
-    }
-    const Regression explained = catalogue.with(others);
-    for (const auto& [key, value] :
-         start_values(partial.study(), explained, effects[k].signature)) {
-      at[of.table().row(key)] = value;
-    }
+    const Regression others = catalogue.with(partial.first, effects, k);
+    set_values(of.table(), start_values(partial.study(), others, effects[k].signature), &at);
   }
   return at;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -67,11 +68,9 @@ std::string residual_sentence(const FoundResidual& found) {
   }
   std::vector<std::string> terms = mapped(found.correction.field, term_text);
   if (found.correction.outliers) terms.push_back(outlier_text(*found.correction.outliers));
-  std::string text;
-  for (const std::string& term : terms) text += (text.empty() ? "" : "; ") + term;
   return "A correction without a cause closes " + percent_text(found.closed) + " [" +
          percent_text(found.closed_lo) + ", " + percent_text(found.closed_hi) +
-         "] of the gap on trials that its fit did not see: " + text +
+         "] of the gap on trials that its fit did not see: " + joined(terms, "; ") +
          ". model.toml has it as [residual].";
 }
 
@@ -138,10 +137,8 @@ TriedShape try_shape(const DiagnosisRequest& of, const Refit& refit, std::size_t
   const std::vector<Eigen::Vector3d> before = held_out_residuals(study, last, folds);
   std::vector<Eigen::Vector3d> after = before;
   Study beside = study;
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    after[i] -= fit.unseen[i];
-    beside.trials[i].residual = after[i];
-  }
+  for (std::size_t i = 0; i < study.size(); ++i) after[i] -= fit.unseen[i];
+  beside.use_residuals(after);
   tried.without_it = tried.with_it = scores_of(study, before, share);
   if (!fit.field.empty()) predict_beside(of, refit, after, &beside, &tried);
   tried.lesson = lesson_about(data, reported_fit, fit, after);
@@ -187,8 +184,7 @@ Refit add_shape(const DiagnosisRequest& of, const Refit& refit) {
   if (tried.residual.empty() || !clearly_better(tried.with_it, refit.nested.back().scores))
     return with;
   const auto n = static_cast<double>(tried.with_it.size());
-  std::vector<double> gains = tried.with_it;
-  for (std::size_t i = 0; i < gains.size(); ++i) gains[i] -= tried.without_it[i];
+  const std::vector<double> gains = gains_over(tried.with_it, tried.without_it);
   const double gained = mean(gains);
   double squares = 0;
   for (const double g : gains) squares += (g - gained) * (g - gained);

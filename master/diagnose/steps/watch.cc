@@ -21,32 +21,21 @@ bool watched(const DiagnosisRequest& of) { return of.options.on_finding != nullp
 
 std::string three_digits(double value) { return plain_number(rounded_to_digits(value, 3)); }
 
-// "3.1 mm and 12 mrad": root mean squares over `count` trials.
-std::string misses_text(double position_squares, double heading_squares, std::size_t count) {
-  const double n = static_cast<double>(std::max<std::size_t>(count, 1));
-  return three_digits(1e3 * std::sqrt(position_squares / n)) + " mm and " +
-         three_digits(1e3 * std::sqrt(heading_squares / n)) + " mrad (root mean square)";
-}
-
-std::vector<Eigen::Vector3d> residuals_of(const Study& study) {
-  std::vector<Eigen::Vector3d> residuals = mapped(study.trials, &ResidualTrial::residual);
-  return residuals;
+// "3.1 mm and 12 mrad (root mean square)".
+std::string misses_text(const RootMeanSquare& error) {
+  return three_digits(error.position_mm) + " mm and " + three_digits(error.heading_mrad) +
+         " mrad (root mean square)";
 }
 
 }  // namespace
 
 void emit_base(const DiagnosisRequest& of, const Study& study) {
   if (!watched(of)) return;
-  double position = 0, heading = 0;
-  for (const ResidualTrial& trial : study.trials) {
-    position += trial.residual.head<2>().squaredNorm();
-    heading += trial.residual[2] * trial.residual[2];
-  }
   Finding finding;
   finding.about = "the base model";
   finding.text = fmt::format("The base model, {} {} trials, misses their ends by {}.",
                              of.options.keep_base ? "as it was given and held against" : "tuned on",
-                             study.size(), misses_text(position, heading, study.size()));
+                             study.size(), misses_text(root_mean_square(study.residuals())));
   for (const std::size_t row : study.on_bounds) {
     finding.text += " " + of.table()[row].key + " ended on its bound.";
   }
@@ -60,12 +49,7 @@ void emit_base(const DiagnosisRequest& of, const Study& study) {
 
 void emit_noise(const DiagnosisRequest& of, const Study& study) {
   if (!watched(of)) return;
-  double position = 0, heading = 0;
-  for (const Eigen::Matrix3d& cov : study.covariances()) {
-    position += cov(0, 0) + cov(1, 1);
-    heading += cov(2, 2);
-  }
-  const std::vector<Eigen::Vector3d> residuals = residuals_of(study);
+  const std::vector<Eigen::Vector3d> residuals = study.residuals();
   const double share = of.outlier_share();
   const double gap = floor_score(study, share) - mean(scores_of(study, residuals, share));
   Finding finding;
@@ -73,7 +57,7 @@ void emit_noise(const DiagnosisRequest& of, const Study& study) {
   finding.text = fmt::format(
       "By chance alone ends would be missed by {}; beyond that, {} nats a trial are there to be "
       "explained.",
-      misses_text(position, heading, study.size()), three_digits(std::max(0.0, gap)));
+      misses_text(error_of_noise(study)), three_digits(std::max(0.0, gap)));
   finding.columns = {"noise", "standard deviation"};
   Overrides at;
   set_noise(of, study.noise, &at);

@@ -76,7 +76,7 @@ Status simulate_shifts(Predictor& predictor, const Study& study, std::vector<Shi
     for (std::size_t i = 0; i < open.size(); ++i) {
       Shift& shift = (*shifts)[open[i]];
       if (ends[i]) {
-        shift.rows = study.whiten(differences(study, *ends[i], 1));
+        shift.rows = study.whiten(differences(study.predicted_ends(), *ends[i]));
       } else {
         shift.strength /= 2;
         failed.push_back(open[i]);
