@@ -15,6 +15,8 @@ namespace gapfarm {
 namespace {
 
 constexpr std::uint64_t kFewestRepeats = 3;
+constexpr std::uint64_t kMostTrials = 500;  // a design that needs more separates nothing
+constexpr std::size_t kMostSentences = 2;
 constexpr double kAlikeFromAnywhere = 0.7;  // least over mean divergence of the starts
 constexpr double kWorthTheTrouble = 1.5;    // divergence of a special way over the ordinary one's
 
@@ -89,9 +91,9 @@ struct Separation {
   bool many_starts = false;  // one start alone would show less
 };
 
-// None: the design does not part the two within `most` trials.
+// None: the design does not part the two within kMostTrials.
 std::optional<Separation> separation(const Design& design, const Predictions& a,
-                                     const Predictions& b, std::uint64_t most) {
+                                     const Predictions& b) {
   double sum = 0, least = INFINITY;
   for (const std::uint32_t i : design.trials) {
     if (!a[i] || !b[i]) return std::nullopt;
@@ -105,7 +107,7 @@ std::optional<Separation> separation(const Design& design, const Predictions& a,
     if (!a[i] || !b[i] || mean < kWorthTheTrouble * divergence(*a[i], *b[i])) return std::nullopt;
   }
   const std::uint64_t needed = trials_needed(mean);
-  if (needed > most) return std::nullopt;
+  if (needed > kMostTrials) return std::nullopt;
   const bool many = design.trials.size() > 1 && least < kAlikeFromAnywhere * mean;
   // The mean over the starts holds only when all of them are driven.
   return Separation{many ? std::max<std::uint64_t>(needed, design.trials.size()) : needed, many};
@@ -129,7 +131,7 @@ bool better(const Choice& a, const Choice& b, const std::vector<Design>& designs
 // The design that parts most of `pairs`, with the fewest trials.
 std::optional<Choice> best_design(const ExperimentPlan& plan,
                                   const std::vector<Predictions>& predictions,
-                                  const std::vector<Pair>& pairs, std::uint64_t most,
+                                  const std::vector<Pair>& pairs,
                                   const std::function<bool(const Design&)>& allowed) {
   std::optional<Choice> best;
   for (std::size_t i = 0; i < plan.designs.size(); ++i) {
@@ -137,8 +139,7 @@ std::optional<Choice> best_design(const ExperimentPlan& plan,
     if (!allowed(design)) continue;
     Choice choice{i, {}, 0, false};
     for (const Pair& pair : pairs) {
-      const auto parted =
-          separation(design, predictions[pair.first], predictions[pair.second], most);
+      const auto parted = separation(design, predictions[pair.first], predictions[pair.second]);
       if (!parted) continue;
       choice.pairs.push_back(pair);
       choice.trials = std::max(choice.trials, parted->trials);
@@ -181,9 +182,10 @@ NextExperiment sentence(const Choice& choice, const ExperimentPlan& plan,
 }
 
 NextExperiment hopeless(const std::vector<Pair>& pairs, const ExperimentPlan& plan,
-                        const CompetingCauses& alternatives, std::uint64_t most) {
+                        const CompetingCauses& alternatives) {
   return {"No " + plan.designs_are + " distinguishes " + distinguished(pairs, alternatives) +
-              " within " + std::to_string(most) + " trials by end poses; " + plan.instead + ".",
+              " within " + std::to_string(kMostTrials) + " trials by end poses; " + plan.instead +
+              ".",
           names_in(pairs, alternatives), 0};
 }
 
@@ -216,10 +218,9 @@ std::uint64_t trials_needed(double divergence) {
 }
 
 Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,
-                                                     const CompetingCauses& alternatives,
-                                                     const NextExperimentOptions& options) {
+                                                     const CompetingCauses& alternatives) {
   std::vector<NextExperiment> next;
-  if (alternatives.size() < 2 || plan.designs.empty() || options.sentences == 0) return next;
+  if (alternatives.size() < 2 || plan.designs.empty()) return next;
   ASSIGN_OR_RETURN(const auto predictions, predict(farm, plan, alternatives));
   std::vector<Pair> pairs;
   for (std::size_t a = 0; a < alternatives.size(); ++a) {
@@ -229,12 +230,12 @@ Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const Experimen
   std::set<std::string> used;
   const auto anything = [](const Design&) { return true; };
   const auto unused = [&](const Design& d) { return !used.contains(d.group); };
-  while (next.size() < options.sentences) {
+  while (next.size() < kMostSentences) {
     const bool again = open.empty();  // all are parted: offer another group
-    const auto choice = again ? best_design(plan, predictions, pairs, options.most_trials, unused)
-                              : best_design(plan, predictions, open, options.most_trials, anything);
+    const auto choice = again ? best_design(plan, predictions, pairs, unused)
+                              : best_design(plan, predictions, open, anything);
     if (!choice) {
-      if (!again) next.push_back(hopeless(open, plan, alternatives, options.most_trials));
+      if (!again) next.push_back(hopeless(open, plan, alternatives));
       break;
     }
     used.insert(plan.designs[choice->design].group);

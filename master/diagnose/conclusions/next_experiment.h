@@ -42,11 +42,6 @@ struct ExperimentPlan {
   std::string instead;      // what to do when no design distinguishes alternatives
 };
 
-struct NextExperimentOptions {
-  std::uint64_t most_trials = 500;  // a design that needs more separates nothing
-  std::size_t sentences = 2;
-};
-
 // A predicted measured end pose in the world, covariance in its own axes.
 struct PredictedEnd {
   Pose X_WM;
@@ -67,13 +62,12 @@ double divergence(const PredictedEnd& a, const PredictedEnd& b);
 std::uint64_t trials_needed(double divergence);
 
 // Predicts every alternative on the plan's designs and says which of them distinguish the
-// alternatives with the fewest trials; at most `sentences`.  A further sentence parts alternatives
-// that the ones before left together, or offers a design of another group.  Alternatives that no
-// design parts get a sentence stating so, with 0 trials.  Fewer than two alternatives need no
-// experiment.  Alternatives are taken at their fits: the base is not retuned to the new trials.
-// Errors: the farm's, and an alternative that cannot be simulated anywhere.
+// alternatives with the fewest trials, 500 at most; two sentences at most.  A further sentence
+// parts alternatives that the ones before left together, or offers a design of another group.
+// Alternatives that no design parts get a sentence stating so, with 0 trials.  Fewer than two
+// alternatives need no experiment.  Alternatives are taken at their fits: the base is not retuned
+// to the new trials. Errors: the farm's, and an alternative that cannot be simulated anywhere.
 Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,
-                                                     const CompetingCauses& alternatives,
-                                                     const NextExperimentOptions& options = {});
+                                                     const CompetingCauses& alternatives);
 
 }  // namespace gapfarm

@@ -14,6 +14,8 @@
 namespace gapfarm {
 namespace {
 
+constexpr double kLevel = 0.01;  // greatest corrected p of a row
+constexpr std::size_t kMostRows = 12;
 constexpr double kOutlierSds = 3.2905;  // square root of the 0.999 quantile of chi2, 1 dof
 constexpr double kOutlierShare = 0.001;
 constexpr double kTrialsForCells = 4;  // a cell, on average, for cell means to be worth their cost
@@ -52,16 +54,15 @@ class Looker {
     covariates_ = options.covariates(trials, residuals, cells);
   }
 
-  // All rows whose corrected p is at most `level`.
-  std::vector<Where> look(const Problem& problem, double level) {
+  std::vector<Where> look(const Problem& problem) {
     std::vector<std::vector<Selection>> selections;
     for (int k = 0; k < 3; ++k) selections.push_back(selections_of(k, problem));
     for (const auto& component : selections) {
       for (const Selection& s : component) looks_ += covariates_.size() + (s.along_motion ? 1 : 3);
     }
     for (const auto& component : selections) {
-      look_for_means(component, level);
-      look_at_scatter(component, level);
+      look_for_means(component);
+      look_at_scatter(component);
     }
     return std::move(rows_);
   }
@@ -99,7 +100,7 @@ class Looker {
   }
 
   // The clearest dependence of the component is reported and taken out, then the next clearest.
-  void look_for_means(const std::vector<Selection>& selections, double level) {
+  void look_for_means(const std::vector<Selection>& selections) {
     for (int round = 0; round < kMostDependences; ++round) {
       std::optional<Found> best;
       for (const Selection& s : selections) {
@@ -117,7 +118,7 @@ class Looker {
                 trend_test(v.u, columns_of(c, s), v.scale, c.within_cells ? v.groups : v.commands));
         }
       }
-      if (!best || corrected(best->test.p) > level) return;
+      if (!best || corrected(best->test.p) > kLevel) return;
       report(*best);
       const Selection& s = *best->selection;
       // With the part that the cells' means took: covariates are centred over all trials.
@@ -279,7 +280,7 @@ class Looker {
   }
 
   // The commands one by one, and all of them pooled; all when most of them scatter so.
-  void look_at_scatter(const std::vector<Selection>& selections, double level) {
+  void look_at_scatter(const std::vector<Selection>& selections) {
     std::vector<Scatter> single;
     Scatter pooled;
     for (const Selection& s : selections) {
@@ -300,7 +301,7 @@ class Looker {
     judge(pooled);
     const bool several = single.size() > 1;
     for (double Scatter::*p : {&Scatter::p_spread, &Scatter::p_outliers}) {
-      const auto clear = [&](const Scatter& s) { return corrected(s.*p) <= level; };
+      const auto clear = [&](const Scatter& s) { return corrected(s.*p) <= kLevel; };
       const auto count = std::count_if(single.begin(), single.end(), clear);
       const bool most = 2 * static_cast<std::size_t>(count) > single.size();
       if (several && clear(pooled) && (most || count == 0)) {
@@ -354,11 +355,10 @@ std::vector<Where> where(std::span<const ResidualTrial> trials,
                          const Problem& problem, const WhereOptions& options) {
   assert(trials.size() == residuals.size() && trials.size() == covariances.size());
   if (trials.empty()) return {};
-  std::vector<Where> rows =
-      Looker(trials, residuals, covariances, cells, options).look(problem, options.level);
+  std::vector<Where> rows = Looker(trials, residuals, covariances, cells, options).look(problem);
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Where& a, const Where& b) { return a.share > b.share; });
-  if (rows.size() > options.most) rows.resize(options.most);
+  if (rows.size() > kMostRows) rows.resize(kMostRows);
   return rows;
 }
 

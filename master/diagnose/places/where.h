@@ -22,8 +22,6 @@ struct WhereLabels {
 };
 
 struct WhereOptions {
-  double level = 0.01;    // greatest corrected p of a row
-  std::size_t most = 12;  // rows
   WhereLabels labels = {};
   std::vector<WhereCovariate> (*covariates)(std::span<const ResidualTrial> trials,
                                             std::span<const Eigen::Vector3d> residuals,
@@ -31,7 +29,8 @@ struct WhereOptions {
 };
 
 // The dependences of `residuals` (measured minus predicted end, m, m, rad, in the predicted end's
-// axes) that chance does not explain, by share, greatest first.
+// axes) that chance does not explain (a corrected p of 0.01 at most), by share, greatest first, and
+// twelve of them at most.
 //
 // Each component is judged on its own, divided by its own s.d. under `covariances`, for each
 // command and for all commands: as it is, and as too much or too little of the motion.  Looks are:
