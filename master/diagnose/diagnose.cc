@@ -118,8 +118,8 @@ constexpr double kNearWorld_m = 5;
 
 // Of start poses, by coordinate: a few wild rows do not move it.
 double middle(const TrialLog& log, double Pose::*coordinate) {
-  std::vector<double> values;
-  for (const Trial& t : log.trials) values.push_back(t.X_WS.*coordinate);
+  std::vector<double> values =
+      mapped(log.trials, [&](const Trial& t) { return t.X_WS.*coordinate; });
   // Whole metres keep the grid of rounded readings.
   return values.empty() ? 0 : std::round(median(values));
 }
@@ -146,9 +146,7 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   Predictor predictor(farm, log.problem);
   StageClock stages(options.on_stage);
   const std::uint64_t undefined_before = undefined_laws();
-  auto result = take_steps({farm, predictor, log.problem, *subject, options,
-                            Eigen::Vector2d(log.frame_x_m, log.frame_y_m)},
-                           &stages);
+  auto result = take_steps({farm, predictor, log.problem, *subject, options, log.frame_m}, &stages);
   if (!result) return result;
   stages.begin("");
   Diagnosis& d = result->diagnosis;
@@ -161,20 +159,20 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
 
 PreparedLog prepare_log(const Problem& problem, const std::optional<Eigen::Vector2d>& frame_m) {
   std::vector<std::size_t> impossible;
-  PreparedLog prepared{problem, 0, 0, check_sanity(problem, &impossible)};
+  PreparedLog prepared;
+  prepared.problem = problem;
+  prepared.sanity = check_sanity(problem, &impossible);
   if (any_unusable(prepared.sanity)) return prepared;
   TrialLog& log = prepared.problem.log;
   for (auto row = impossible.rbegin(); row != impossible.rend(); ++row) {
     log.trials.erase(log.trials.begin() + static_cast<std::ptrdiff_t>(*row));
   }
   if (frame_m) {
-    prepared.frame_x_m = frame_m->x();
-    prepared.frame_y_m = frame_m->y();
+    prepared.frame_m = *frame_m;
   } else if (far_out(log)) {
-    prepared.frame_x_m = middle(log, &Pose::x);
-    prepared.frame_y_m = middle(log, &Pose::y);
+    prepared.frame_m = {middle(log, &Pose::x), middle(log, &Pose::y)};
   }
-  log = shifted(std::move(log), -prepared.frame_x_m, -prepared.frame_y_m);
+  log = shifted(std::move(log), -prepared.frame_m.x(), -prepared.frame_m.y());
   return prepared;
 }
 

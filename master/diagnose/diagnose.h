@@ -48,8 +48,8 @@ struct DiagnoseOptions {
 struct DiagnosisResult {
   Diagnosis diagnosis;
   std::string problem;  // hash of what was simulated: the log in its own frame
-  // World position that the values' places count from, m.
-  double frame_x_m = 0, frame_y_m = 0;
+  // World position that the values' places count from.
+  Eigen::Vector2d frame_m = Eigen::Vector2d::Zero();
   ParameterValues tuned;   // the base model, as tuned
   ParameterValues final_;  // with the named effects
   Residual residual;       // beside final_: what they leave unexplained; may be empty
@@ -71,7 +71,7 @@ struct PreparedLog {
   Problem problem;
   // World position of that frame's origin, whole metres: (0, 0) for a log near the world's origin,
   // else its middle, so that places stay within the parameters' bounds wherever a map begins.
-  double frame_x_m = 0, frame_y_m = 0;
+  Eigen::Vector2d frame_m = Eigen::Vector2d::Zero();
   std::vector<SanityFinding> sanity;
 };
 // `frame_m`: what it has to be, where that is known.

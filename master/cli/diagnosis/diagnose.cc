@@ -102,8 +102,8 @@ Model model_of(const Config& config, const DiagnosisResult& result, const Parame
                const std::string& kind) {
   Model model = model_of_problem(config.problem, values);
   model.kind = kind;
-  model.frame_x_m = result.frame_x_m;
-  model.frame_y_m = result.frame_y_m;
+  model.frame_x_m = result.frame_m.x();
+  model.frame_y_m = result.frame_m.y();
   model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
                 config.trial_files};
   return model;

@@ -59,8 +59,7 @@ void fill_judgement(const Judgement& judged, Diagnosis* d) {
 DiagnosisResult begun(const DiagnosisRequest& of) {
   DiagnosisResult result;
   result.problem = of.predictor.problem_hash();
-  result.frame_x_m = of.frame_m.x();
-  result.frame_y_m = of.frame_m.y();
+  result.frame_m = of.frame_m;
   return result;
 }
 

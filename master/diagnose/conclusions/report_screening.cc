@@ -6,7 +6,6 @@
 
 #include "common/base/ranges.h"
 #include "common/effects/catalogue.h"
-#include "common/math/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/evidence/residuals.h"
@@ -111,9 +110,8 @@ std::vector<Screened> complete_rows(const DiagnosisRequest& of, const Screening&
     row.note = screened.note;
     row.gain = std::max(0.0, screened.gain);
     if (!(screened.gain > 0)) continue;
-    row.estimate = screened.key + " " +
-                   of.table().format(of.table().row(name + "." + screened.key),
-                                     rounded_to_digits(screened.value, 4));
+    row.estimate =
+        value_text(of, of.table().row(name + "." + screened.key), screened.value, Overrides());
   }
   return rows;
 }

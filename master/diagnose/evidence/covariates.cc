@@ -13,7 +13,6 @@ namespace gapfarm {
 namespace {
 
 using Values = std::vector<double>;  // one a trial
-using Feature = std::function<double(const ResidualTrial&)>;
 
 class BlockBuilder {
  public:
@@ -54,31 +53,20 @@ class BlockBuilder {
   // World-frame shifts of the readings that depend on the pose: end's less start's, seen from the
   // predicted end; a heading shift of the start turns the whole prediction.
   CovariateBlock readings() const {
-    using Field = std::function<double(const Pose&)>;
-    const Eigen::Vector2d middle = middle_of(study_);
-    std::vector<Field> fields;
-    for (int i = 0; i <= 3; ++i) {
-      for (int j = 0; i + j <= 3; ++j) {
-        if (i + j == 0) continue;
-        fields.push_back([=](const Pose& X) {
-          return std::pow(X.x - middle.x(), i) * std::pow(X.y - middle.y(), j);
-        });
-      }
-    }
+    std::vector<PoseFeature> fields = powers_of_place(study_);
     for (int h = 1; h <= 3; ++h) {
       fields.push_back([=](const Pose& X) { return std::cos(h * X.theta); });
       fields.push_back([=](const Pose& X) { return std::sin(h * X.theta); });
     }
     std::vector<Eigen::VectorXd> columns;
-    for (const Field& field : fields) {
+    for (const PoseFeature& field : fields) {
       for (int k = 0; k < 3; ++k) columns.push_back(study_.whiten(reading_shift(field, k)));
     }
     return {"place of the readings", stack(columns)};
   }
 
  private:
-  std::vector<Eigen::Vector3d> reading_shift(const std::function<double(const Pose&)>& field,
-                                             int component) const {
+  std::vector<Eigen::Vector3d> reading_shift(const PoseFeature& field, int component) const {
     std::vector<Eigen::Vector3d> d(study_.size(), Eigen::Vector3d::Zero());
     for (std::size_t i = 0; i < d.size(); ++i) {
       const ResidualTrial& t = study_.trials[i];
@@ -130,6 +118,29 @@ std::vector<CovariateBlock> blocks_before(const Study& study, const BlockBuilder
 
 }  // namespace
 
+std::vector<Feature> start_place(const Study& study) {
+  const Eigen::Vector2d middle = middle_of(study);
+  const auto x = [=](const ResidualTrial& t) { return t.X_WS.x - middle.x(); };
+  const auto y = [=](const ResidualTrial& t) { return t.X_WS.y - middle.y(); };
+  return {x, y, [=](const ResidualTrial& t) { return x(t) * x(t); },
+          [=](const ResidualTrial& t) { return x(t) * y(t); },
+          [=](const ResidualTrial& t) { return y(t) * y(t); }};
+}
+
+std::vector<PoseFeature> powers_of_place(const Study& study) {
+  const Eigen::Vector2d middle = middle_of(study);
+  std::vector<PoseFeature> powers;
+  for (int i = 0; i <= 3; ++i) {
+    for (int j = 0; i + j <= 3; ++j) {
+      if (i + j == 0) continue;
+      powers.push_back([=](const Pose& X) {
+        return std::pow(X.x - middle.x(), i) * std::pow(X.y - middle.y(), j);
+      });
+    }
+  }
+  return powers;
+}
+
 std::vector<CovariateBlock> covariate_blocks(const Study& study) {
   const BlockBuilder b(study);
   const auto scaled = [&](const Feature& f) { return b.by_path(f); };
@@ -143,12 +154,9 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
   for (const ResidualTrial& t : study.trials) {
     longest_s = std::max(longest_s, t.context.session_time_s);
   }
-  const Eigen::Vector2d middle = middle_of(study);
   const auto time = [=](const ResidualTrial& t) {
     return t.context.session_time_s / longest_s - 0.5;
   };
-  const auto x = [=](const ResidualTrial& t) { return t.X_WS.x - middle.x(); };
-  const auto y = [=](const ResidualTrial& t) { return t.X_WS.y - middle.y(); };
   const auto reversed = [&](bool left) {
     return b.values([=, &b](const ResidualTrial& t) {
       const int last = left ? t.context.last_left : t.context.last_right;
@@ -172,12 +180,7 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
     blocks.push_back(b.block("end heading", end_heading(1), commands));
     blocks.push_back(b.block("end heading, twice a turn", end_heading(2), commands));
   }
-  blocks.push_back(
-      b.block("start place",
-              {scaled(x), scaled(y), scaled([=](const ResidualTrial& t) { return x(t) * x(t); }),
-               scaled([=](const ResidualTrial& t) { return x(t) * y(t); }),
-               scaled([=](const ResidualTrial& t) { return y(t) * y(t); })},
-              commands));
+  blocks.push_back(b.block("start place", mapped(start_place(study), scaled), commands));
   blocks.push_back(b.readings());
   blocks.push_back(b.block(
       "session time",

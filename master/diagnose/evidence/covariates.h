@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,13 @@ struct CovariateBlock {
   Eigen::MatrixXd columns;  // whitened
   double expected = 0;      // standard deviation of coefficients that are nothing to speak of
 };
+
+using Feature = std::function<double(const ResidualTrial&)>;
+using PoseFeature = std::function<double(const Pose&)>;
+// Where a trial starts, seen from the middle of all starts, and the products of that.
+std::vector<Feature> start_place(const Study& study);
+// x^i y^j of a pose up to the third power, seen from there.
+std::vector<PoseFeature> powers_of_place(const Study& study);
 
 std::vector<CovariateBlock> covariate_blocks(const Study& study);
 

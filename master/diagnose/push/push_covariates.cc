@@ -10,8 +10,6 @@
 namespace gapfarm {
 namespace {
 
-using Feature = std::function<double(const ResidualTrial&)>;
-
 // Of a piece whose outline and finger are known to this, m.
 constexpr double kOutline_m = 3e-4;
 // What a simulation of other physics gets wrong of a push, along it, across it and in turn, over
@@ -66,22 +64,15 @@ CovariateBlock block(const Study& study, const std::string& name,
 // World-frame shifts of the readings that depend on the pose: the end's, less what the start's
 // does to the end.
 CovariateBlock readings(const Study& study) {
-  const Eigen::Vector2d middle = middle_of(study);
   std::vector<Eigen::VectorXd> columns;
-  for (int i = 0; i <= 3; ++i) {
-    for (int j = 0; i + j <= 3; ++j) {
-      if (i + j == 0) continue;
-      const auto field = [&](const Pose& X) {
-        return std::pow(X.x - middle.x(), i) * std::pow(X.y - middle.y(), j);
-      };
-      for (int k = 0; k < 2; ++k) {
-        std::vector<Eigen::Vector3d> d;
-        for (const ResidualTrial& t : study.trials) {
-          d.push_back(field(t.X_WP) * rotation_about_z(-t.X_WP.theta).col(k) -
-                      field(t.X_WS) * t.spread.start.col(k));
-        }
-        columns.push_back(study.whiten(d));
+  for (const auto& power : powers_of_place(study)) {
+    for (int k = 0; k < 2; ++k) {
+      std::vector<Eigen::Vector3d> d;
+      for (const ResidualTrial& t : study.trials) {
+        d.push_back(power(t.X_WP) * rotation_about_z(-t.X_WP.theta).col(k) -
+                    power(t.X_WS) * t.spread.start.col(k));
       }
+      columns.push_back(study.whiten(d));
     }
   }
   return {"place of the readings", stack(columns)};
@@ -182,9 +173,6 @@ std::vector<CovariateBlock> push_blocks(const Study& study) {
   const Feature one = [](const ResidualTrial&) { return 1.0; };
   const auto direction = [](const ResidualTrial& t) { return t.push.direction_rad; };
   const auto in_piece = [](const ResidualTrial& t) { return t.push.in_piece_rad; };
-  const Eigen::Vector2d middle = middle_of(study);
-  const auto x = [=](const ResidualTrial& t) { return t.X_WS.x - middle.x(); };
-  const auto y = [=](const ResidualTrial& t) { return t.X_WS.y - middle.y(); };
   const auto slid = standardised(
       study, [](const ResidualTrial& t) { return t.spread.slid_m; }, 1e-3);
   const auto speed = standardised(
@@ -203,10 +191,7 @@ std::vector<CovariateBlock> push_blocks(const Study& study) {
                          harmonics([=](const ResidualTrial& t) { return 2 * direction(t); }, 1)));
   blocks.push_back(block(study, "start heading",
                          harmonics([](const ResidualTrial& t) { return t.X_WS.theta; }, 2)));
-  blocks.push_back(block(study, "start place",
-                         {x, y, [=](const ResidualTrial& t) { return x(t) * x(t); },
-                          [=](const ResidualTrial& t) { return x(t) * y(t); },
-                          [=](const ResidualTrial& t) { return y(t) * y(t); }}));
+  blocks.push_back(block(study, "start place", start_place(study)));
   blocks.push_back(readings(study));
   blocks.push_back(block(study, "distance slid", powers(slid, 2)));
   blocks.push_back(block(study, "finger speed", powers(speed, 2)));

@@ -7,7 +7,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
-#include "common/math/digits.h"
 #include "common/math/laws.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/evidence/noise.h"
@@ -58,10 +57,8 @@ std::string estimate_text(const DiagnosisRequest& of, const infer::Contender& c,
   const Overrides at = c.model.space.values(c.model.fit.u);
   std::string text;
   for (const auto& [row, value] : at) {
-    const Parameter& p = of.table()[row];
-    if (p.effect != effect) continue;
-    text += (text.empty() ? "" : ", ") + p.key.substr(p.key.find('.') + 1) + " " +
-            of.table().format(row, rounded_to_digits(value + of.frame_of(p.key, at), 4));
+    if (of.table()[row].effect != effect) continue;
+    text += (text.empty() ? "" : ", ") + value_text(of, row, value, at);
   }
   return text;
 }

@@ -34,6 +34,9 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
 
 // Score by score.
 std::vector<double> gains_over(std::vector<double> scores, const std::vector<double>& others);
+// "rate 0.0035 1/min": a row of an effect, a place as the world has it.
+std::string value_text(const DiagnosisRequest& of, std::size_t row, double value,
+                       const Overrides& at);
 // By paired scores: not by chance, but for one case in twenty.
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
 

@@ -37,9 +37,8 @@ std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evide
     set_values(table, values, &start);
     for (const auto& [key, value] : values) {
       if (key.rfind(s.effect + ".", 0) != 0) continue;
-      const std::size_t at = table.row(key);
-      row.estimate += (row.estimate.empty() ? "" : ", ") + key.substr(key.find('.') + 1) + " " +
-                      table.format(at, rounded_to_digits(value + of.frame_of(key, start), 4));
+      row.estimate +=
+          (row.estimate.empty() ? "" : ", ") + value_text(of, table.row(key), value, start);
     }
     for (std::size_t j = 0; j < candidates.size(); ++j) {
       const double lengths = explained[i].norm() * explained[j].norm();
@@ -238,6 +237,13 @@ Status screen_alone(const DiagnosisRequest& of, const Explanation& found, Screen
   emit_candidates(of, alone);
   screening->alone = std::move(alone);
   return {};
+}
+
+std::string value_text(const DiagnosisRequest& of, std::size_t row, double value,
+                       const Overrides& at) {
+  const std::string& key = of.table()[row].key;
+  return key.substr(key.find('.') + 1) + " " +
+         of.table().format(row, rounded_to_digits(value + of.frame_of(key, at), 4));
 }
 
 double sum_of_gains(const std::vector<EffectCandidate>& chosen) {

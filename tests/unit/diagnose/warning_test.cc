@@ -78,10 +78,10 @@ TEST(Slopes, OneSideAloneIsHeldAgainstTheMiddle) {
 
 TEST(PrepareLog, TakesALogFarOffRelativeToItsOwnMiddle) {
   const Problem near = kinematic_log(60);
-  EXPECT_EQ(prepare_log(near).frame_x_m, 0);
+  EXPECT_EQ(prepare_log(near).frame_m.x(), 0);
   const PreparedLog far = prepare_log(moved(near, 5000, -3000));
-  EXPECT_NEAR(far.frame_x_m, 5000, 1);
-  EXPECT_NEAR(far.frame_y_m, -3000, 1);
+  EXPECT_NEAR(far.frame_m.x(), 5000, 1);
+  EXPECT_NEAR(far.frame_m.y(), -3000, 1);
   for (std::size_t i = 0; i < 60; ++i) {
     EXPECT_NEAR(far.problem.log.trials[i].X_WE.x, near.log.trials[i].X_WE.x, 1.5);
   }
