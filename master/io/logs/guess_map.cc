@@ -3,6 +3,8 @@
 #include <cctype>
 #include <cmath>
 
+#include "common/math/statistics.h"
+#include "common/recordings/increment_noise.h"
 #include "master/io/logs/column_map.h"
 
 namespace gapfarm {
@@ -12,6 +14,9 @@ namespace {
 constexpr double kFastest_m_s = 30;
 // A stamp further from the time of recording is on a clock of its own, or was never set.
 constexpr double kNearClocks_s = 60;
+// Of a clock more steps lead on, runs' beginnings and a few rows in disorder aside.
+constexpr double kLeastLeadOn = 0.75;
+constexpr double kMostUneven = 10;  // of what rows last, over their middle or below it
 
 // "Vicon x [mm]" to "vicon.x"; paths and blanks become dots, units in brackets go.
 std::string plain(const std::string& name) {
@@ -47,30 +52,22 @@ struct Role {
   Aliases aliases;
 };
 
-const Aliases kTime = {"t",
-                       "time",
-                       "header.stamp",
-                       "*.header.stamp",
-                       "timestamp",
-                       "stamp",
-                       "%time",
-                       "__time",
-                       "vicon.time",
-                       "time_s",
-                       "secs",
-                       "*.time",
-                       "elapsed.time.sensors"};
+const Aliases kTime = {
+    "t",    "time",   "*.header.stamp",       "timestamp", "stamp", "%time", "__time", "time_s",
+    "secs", "*.time", "elapsed.time.sensors", "dt"};
 const Aliases kRun = {"run", "step", "trial", "take"};
 const Aliases kKeep = {"pose_new"};
 
 const std::vector<Role>& pose_roles() {
   static const std::vector<Role> kRoles = {
-      {"x", {"x", "*.position.x", "vicon.x", "*.pose.x", "*.translation.x", "px", "pos_x", "x_m"}},
-      {"y", {"y", "*.position.y", "vicon.y", "*.pose.y", "*.translation.y", "py", "pos_y", "y_m"}},
+      {"x",
+       {"x", "*.position.x", "vicon.x", "*.pose.x", "*.translation.x", "px", "pos_x", "x_m", "dx"}},
+      {"y",
+       {"y", "*.position.y", "vicon.y", "*.pose.y", "*.translation.y", "py", "pos_y", "y_m", "dy"}},
       {"z", {"z", "*.position.z", "*.translation.z"}},
       {"theta",
        {"theta", "yaw", "heading", "vicon.yaw", "*.pose.theta", "theta_rad", "yaw_deg", "theta_deg",
-        "heading_deg"}},
+        "heading_deg", "dtheta", "dyaw"}},
       {"qx", {"qx", "*.orientation.x", "*.rotation.x"}},
       {"qy", {"qy", "*.orientation.y", "*.rotation.y"}},
       {"qz", {"qz", "*.orientation.z", "*.rotation.z"}},
@@ -160,7 +157,7 @@ class Guess {
 
   // The stamp of the message where it is set and on the recorder's clock, else the recorder's time.
   static std::string time_of(const LogTable& table) {
-    const std::string stamp = column_of(table, {"header.stamp", "*.header.stamp"});
+    const std::string stamp = column_of(table, {"*.header.stamp"});
     const std::string time = column_of(table, kTime);
     if (stamp.empty() || table.topic.empty()) return stamp.empty() ? time : stamp;
     const auto stamps = numbers(table, stamp), times = numbers(table, "t");
@@ -189,6 +186,17 @@ class Guess {
     to.source = table.topic;
     to.run = column_of(table, kRun);
     to.columns.push_back({"t", time, time_unit(table, time)});
+    to.intervals = lasts(numbers(table, time));
+  }
+
+  // Whether these are no times of a clock, but how long each row lasts.
+  static bool lasts(const std::vector<double>& times) {
+    double lead_on = 0;
+    for (std::size_t i = 1; i < times.size(); ++i) lead_on += times[i] > times[i - 1] ? 1 : 0;
+    if (lead_on >= kLeastLeadOn * (static_cast<double>(times.size()) - 1)) return false;
+    const double middle = median(times);
+    const auto [least, most] = std::ranges::minmax(times);
+    return least > middle / kMostUneven && most < middle * kMostUneven;
   }
 
   void guess_poses(const LogTable& table, const std::string& time, bool odometry) {
@@ -203,6 +211,8 @@ class Guess {
       quaternion = quaternion && found.find(part) != nullptr;
     }
     const bool place = found.find("x") != nullptr && found.find("y") != nullptr;
+    found.increments = place && plain(found.find("x")->column) == "dx";
+    if (found.increments) guess_noise(table, found);
     const bool heading = quaternion || found.find("theta") != nullptr;
     if (place && !heading && map_.no_heading.empty()) map_.no_heading = table.source;
     if (!place || !heading) return;
@@ -225,6 +235,17 @@ class Guess {
       map_.notes.push_back("poses are odometry (" + table.source +
                            "): wheels' slip cannot be seen in what wheels say; record poses by "
                            "motion capture, laser or tags");
+    }
+  }
+
+  static void guess_noise(const LogTable& table, TableMap& increments) {
+    for (const auto* roles : {&kCovarianceColumns, &kDeviationColumns}) {
+      if (!increments.noise().empty()) return;
+      const auto there = [&](const std::string& role) { return !column_of(table, {role}).empty(); };
+      if (!std::ranges::all_of(*roles, there)) continue;
+      for (const std::string& role : *roles) {
+        increments.columns.push_back({role, column_of(table, {role}), ""});
+      }
     }
   }
 
@@ -302,6 +323,7 @@ class Guess {
     for (const char* unit : {"mm", "cm"}) {
       if (has_word(x, unit)) return unit;
     }
+    if (found.increments) return "m";
     const auto xi = table.find(x), ti = table.find(found.find("t")->column);
     // The median outlives jumps between runs and stamps that hardly differ.
     std::vector<double> speeds;

@@ -73,6 +73,28 @@ TEST(TextLogs, HeadedCsv) {
             "0,10000,1000,2000,28.64788976,0.1,0\r\n1,10100,1100,2000,34.37746771,0.3,-0.2\r\n"}));
 }
 
+// A column of times that do not lead on is how long each row lasts; dx and dy are increments.
+TEST(TextLogs, IncrementsOfRowsThatLast) {
+  const Read r =
+      read({"T,left,right,dx,dy,dtheta,sd_x,sd_y,sd_theta\n0.5,1,2,0.1,0,0.05,1e-3,1e-3,2e-3\n"
+            "0.4,1,2,0.2,0.01,0.06,1e-3,1e-3,2e-3\n0.45,2,2,0.2,0,0,1e-3,1e-3,2e-3\n"
+            "0.35,1,1,0.1,0,0,1e-3,1e-3,2e-3\n"});
+  EXPECT_TRUE(r.map.poses.increments);
+  EXPECT_THAT(format_map(r.map), HasSubstr("dt = { column = \"T\", unit = \"s\" }"));
+  ASSERT_TRUE(r.runs) << r.runs.error().message;
+  EXPECT_TRUE(r.runs->log.relative);
+  const LoggedRun& run = r.runs->log.runs[0];
+  const PoseRow& last = run.poses.back();
+  EXPECT_NEAR(last.t_s - run.poses.front().t_s, 1.7, 1e-9);
+  ASSERT_TRUE(last.noise);
+  EXPECT_NEAR((*last.noise)(2, 2), 4e-6, 1e-15);
+  // Where they lead on but for where runs begin, they are a clock's.
+  const Read clock =
+      read({"t,x,y,theta,v,w\n0,1,2,0,1,0\n1,1,2,0,1,0\n2,1,2,0,1,0\n3,1,2,0,1,0\n"
+            "4,1,2,0,1,0\n5,1,2,0,1,0\n"});
+  EXPECT_FALSE(clock.map.poses.intervals);
+}
+
 TEST(TextLogs, PosesAndCommandsInTwoFiles) {
   expect_the_drive(read({kTwists, "t,x,y,theta\n10,1,2,0.5\n10.1,1.1,2,0.6\n"}));
 }
