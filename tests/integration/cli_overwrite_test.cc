@@ -83,6 +83,11 @@ TEST_F(Overwrite, TheRobotsFileOfAConfigIsAnInput) {
   refused({"plan", config, "--limit", "left=10", "--limit", "right=10", "--out",
            folder_ / "plan.csv", "--picture", robot, "--force"},
           robot, "is read by this command");
+  const Finished plan =
+      gapfarm_command({"plan", config, "--limit", "left=10", "--limit", "right=10", "--seconds",
+                       "5", "--want", "separation=0.01%", "--out", folder_ / "plan"});
+  EXPECT_EQ(plan.exit_code, 0) << plan.err;
+  EXPECT_THAT(plan.out, HasSubstr("separation stays wider than wanted: "));
 }
 
 TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {

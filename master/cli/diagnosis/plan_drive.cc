@@ -200,6 +200,18 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
         "As narrow as after {:.0f} s {}, for the wanted together: after {:.1f} s of this drive\n",
         at.t_s, other.name, *seconds);
   }
+  const WidthsAt& end = drive.widths.back();
+  json["wider_than_wanted"] = Json::array();
+  for (const plan::Wanted& w : wanted) {
+    const auto row = std::ranges::find(drive.rows, w.name, &KinematicRow::name);
+    const double width = end.widths[row - drive.rows.begin()];
+    if (w.width == 0 || width <= w.width) continue;
+    json["wider_than_wanted"].push_back(w.name);
+    text += fmt::format(
+        "{} stays wider than wanted: {} after {:.0f} s, wanted {}; give more --seconds (widths "
+        "shrink as the root of them), or a larger floor\n",
+        w.name, width_text(*row, width), end.t_s, width_text(*row, w.width));
+  }
   json["best_share"] = drive.best_share;
   text += fmt::format(
       "No drive of as many seconds of such moves makes them more than {:.0f} % narrower, for the "
