@@ -120,10 +120,15 @@ Result<int> import_runs(ImportOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(LogMap map, read_map(options.map, recordings));
   if (options.map.empty()) drive_by_wheels(map);
   for (const std::string& note : map.notes) console.note(printable(note));
-  const std::string map_text =
-      (options.map.empty() ? "# Guessed from names and numbers; correct it and give it by --map.\n"
-                           : "") +
-      format_map(map);
+  std::string map_text = format_map(map);
+  if (map_text.empty()) {
+    map_text =
+        "# No column was recognised.  Name them, and give this by --map (docs/formats.md):\n"
+        "# [poses]\n# t = \"\"\n# x = \"\"\n# y = \"\"\n# theta = \"\"\n# [commands]\n# t = \"\"\n"
+        "# left = \"\"\n# right = \"\"\n";
+  } else if (options.map.empty()) {
+    map_text.insert(0, "# Guessed from names and numbers; correct it and give it by --map.\n");
+  }
   if (options.print_map) {
     console.result(columns_text(recordings) + map_text, {{"map", map_text}});
     return kExitDone;
