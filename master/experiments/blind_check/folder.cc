@@ -13,6 +13,11 @@ namespace gapfarm {
 namespace {
 
 constexpr auto kOutOfReach = [](auto& v, auto& row) { FIELDS(effect, level, size); };
+constexpr auto kCheckState = [](auto& v, auto& row) {
+  FIELDS(made_of, asked);
+  v.list("out_of_reach", row.out_of_reach, kOutOfReach);
+};
+constexpr auto kChildEnd = [](auto& v, auto& row) { FIELDS(status, wall_s, cpu_s, text); };
 
 std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t number,
                                           const CheckPaths& paths,
@@ -41,11 +46,8 @@ std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t numb
 }
 
 Status write_outcome(const ChildEnd& end, const std::string& path) {
-  const Json json = {{"outcome", child_state_name(end.state)},
-                     {"status", end.status},
-                     {"wall_s", end.wall_s},
-                     {"cpu_s", end.cpu_s},
-                     {"text", end.text}};
+  Json json = {{"outcome", child_state_name(end.state)}};
+  json.update(FieldWriter::written(end, kChildEnd));
   return write_file_atomically(path, json_text(json, 1) + "\n");
 }
 
@@ -65,10 +67,8 @@ Status make_empty(const std::string& folder) {
 }  // namespace
 
 Status write_check_state(const CheckState& state, const std::string& path) {
-  const Json json = {{"version", 1},
-                     {"made_of", state.made_of},
-                     {"asked", state.asked},
-                     {"out_of_reach", FieldWriter::list(state.out_of_reach, kOutOfReach)}};
+  Json json = {{"version", 1}};
+  json.update(FieldWriter::written(state, kCheckState));
   return write_file_atomically(path, json_text(json, 1) + "\n");
 }
 
@@ -78,14 +78,7 @@ Result<CheckState> read_check_state(const std::string& path) {
   if (!json.is_object() || !json.value("made_of", Json()).is_string()) {
     return Error{path + ": is not the state of a blind check; choose another --out"};
   }
-  CheckState state;
-  state.made_of = json["made_of"].get<std::string>();
-  if (json.contains("asked") && json["asked"].is_string()) {
-    state.asked = json["asked"].get<std::string>();
-  }
-  state.out_of_reach =
-      LenientFields::list<OutOfReach>(json.value("out_of_reach", Json()), kOutOfReach);
-  return state;
+  return LenientFields::read<CheckState>(json, kCheckState);
 }
 
 Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& paths,
@@ -124,7 +117,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
 ChildEnd read_outcome(const std::string& path) {
   const Result<std::string> text = read_text_file(path);
   const Json json = text ? parse_json(*text) : Json();
-  ChildEnd end;
+  auto end = LenientFields::read<ChildEnd>(json, kChildEnd);
   if (!json.is_object()) {
     end.state = ChildState::kFailed;
     end.text = "has no outcome";
@@ -135,10 +128,6 @@ ChildEnd read_outcome(const std::string& path) {
        {ChildState::kDone, ChildState::kFailed, ChildState::kCrashed, ChildState::kTimedOut}) {
     if (name == child_state_name(state)) end.state = state;
   }
-  end.status = json.value("status", 0);
-  end.wall_s = json.value("wall_s", 0.0);
-  end.cpu_s = json.value("cpu_s", 0.0);
-  end.text = json.value("text", "");
   return end;
 }
 

@@ -208,7 +208,6 @@ std::string first_reported(const Reported& reported) {
 }
 
 std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<Coverage> all;
   for (const TrueEffect& effect : truth.effects) {
     const auto named = std::ranges::find(reported.effects, effect.name, &ReportedEffect::name);
@@ -221,7 +220,7 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) 
       const auto value = stated.find(p.key);
       if (value == stated.end() || !p.choices.empty()) continue;
       if (neutral && i >= entry->strengths) continue;
-      Coverage coverage{effect.name, p.key, value->second, kNone, kNone, false};
+      Coverage coverage{effect.name, p.key, value->second, kAbsent, kAbsent, false};
       coverage.is_strength = i < entry->strengths;
       for (const ReportedParameter& s : named->parameters) {
         if (s.key != p.key) continue;
@@ -247,8 +246,9 @@ double promised_shrinkage(const Reported& reported) {
   return sum;
 }
 
-RateInterval wilson_interval(const Rate& rate, double z) {
-  if (rate.total == 0) return {};
+Interval wilson_interval(const Rate& rate) {
+  if (rate.total == 0) return {0, 1};
+  constexpr double z = 1.959964;  // of the normal law's middle 95 %
   const double n = rate.total;
   const double p = rate.share();
   const double z2 = z * z;

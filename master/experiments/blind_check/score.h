@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/interval.h"
 #include "common/base/result.h"
 #include "master/experiments/blind_check/cases/seal.h"
 
@@ -94,13 +95,7 @@ struct Rate {
   double share() const { return total ? static_cast<double>(hits) / total : 0; }
 };
 
-struct RateInterval {
-  double lower = 0;
-  double upper = 1;
-};
-
-// Score interval for a binomial share (Wilson 1927) of the given coverage's normal quantile `z`;
-// [0, 1] for no trials.
-RateInterval wilson_interval(const Rate& rate, double z = 1.959964);
+// 95 % score interval for a binomial share (Wilson 1927); [0, 1] for no trials.
+Interval wilson_interval(const Rate& rate);
 
 }  // namespace gapfarm

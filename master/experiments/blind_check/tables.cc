@@ -57,7 +57,7 @@ std::vector<RateRow> rate_rows(const Tally& sum) {
 
 std::string percent(const Rate& rate) {
   if (rate.total == 0) return "-";
-  const RateInterval i = wilson_interval(rate);
+  const Interval i = wilson_interval(rate);
   return formatted("%.0f %% [%.0f, %.0f]", 100 * rate.share(), 100 * i.lower, 100 * i.upper);
 }
 
@@ -72,7 +72,7 @@ std::string share(const std::optional<double>& value) {
 }
 
 Json rate_json(const Rate& rate) {
-  const RateInterval i = wilson_interval(rate);
+  const Interval i = wilson_interval(rate);
   Json json = {{"hits", rate.hits}, {"total", rate.total}};
   if (rate.total > 0) {
     json["share"] = rate.share();

@@ -5,25 +5,25 @@
 #include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/config/model.h"
+#include "common/math/statistics.h"
+#include "master/experiments/crossfit/crossfit.h"
 #include "master/farm/planned_trials.h"
 
 namespace gapfarm {
 namespace {
 
-v1::Task predict_with(const ParameterValues& problem, const ParameterValues& values) {
-  v1::Task task;
-  const auto overrides = overrides_of(problem, values);
-  task.mutable_predict()->mutable_point()->mutable_overrides()->Add(overrides.begin(),
-                                                                    overrides.end());
-  return task;
+// Nats a trial that must be there to explain, for shares of it to mean anything.
+constexpr double kLeastGap = 0.02;
+
+std::optional<double> mean_log_score(const PredictedEnds& predicted) {
+  if (predicted.log_scores.empty()) return std::nullopt;
+  return mean(predicted.log_scores);
 }
 
-std::optional<double> mean_log_score(const v1::TaskResult& result) {
-  const v1::PredictResult& predict = result.predict();
-  if (result.outcome() != v1::OK || predict.predictions_size() == 0) return std::nullopt;
-  double sum = 0;
-  for (const v1::Predicted& p : predict.predictions()) sum += p.log_score();
-  return sum / predict.predictions_size();
+// What the truth gains over the tuned base; none: too little.
+std::optional<double> gap_of(const FreshScores& scores) {
+  const double gap = scores.truth - scores.tuned;
+  return gap >= kLeastGap ? std::optional(gap) : std::nullopt;
 }
 
 std::string truth_family(const Truth& truth) {
@@ -88,13 +88,12 @@ Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     for (const v1::Override& o : overrides_of(problem.table(), truths[i])) {
       problem.values[o.parameter()] = o.value();
     }
-    ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)),
-                                                  {predict_with(problem.values, cases[i].tuned),
-                                                   predict_with(problem.values, cases[i].final_),
-                                                   predict_with(problem.values, problem.values)}));
-    const auto tuned = mean_log_score(results[0]);
-    const auto final_score = mean_log_score(results[1]);
-    const auto truth = mean_log_score(results[2]);
+    ASSIGN_OR_RETURN(
+        const auto predicted,
+        predict_ends(problem, {cases[i].tuned, cases[i].final_, problem.values}, farm, true));
+    const auto tuned = mean_log_score(predicted[0]);
+    const auto final_score = mean_log_score(predicted[1]);
+    const auto truth = mean_log_score(predicted[2]);
     scores.emplace_back();
     if (tuned && final_score && truth) {
       scores.back() = FreshScores{*tuned, *final_score, *truth, std::nullopt};
@@ -102,26 +101,25 @@ Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     if (scores.back() && !cases[i].residual.empty()) {
       Problem corrected = problem;
       corrected.residual = cases[i].residual;
-      ASSIGN_OR_RETURN(const auto result,
-                       farm.run(farm.add_problem(to_proto(corrected)),
-                                {predict_with(problem.values, cases[i].final_)}));
-      scores.back()->corrected = mean_log_score(result.front());
+      ASSIGN_OR_RETURN(const auto with_residual,
+                       predict_ends(corrected, {cases[i].final_}, farm, true));
+      scores.back()->corrected = mean_log_score(with_residual.front());
     }
     if (progress) progress("fresh logs predicted", i + 1, cases.size());
   }
   return scores;
 }
 
-std::optional<double> realised_shrinkage(const FreshScores& scores, double least_gap) {
-  const double gap = scores.truth - scores.tuned;
-  if (!(gap >= least_gap)) return std::nullopt;
-  return (scores.final_ - scores.tuned) / gap;
+std::optional<double> realised_shrinkage(const FreshScores& scores) {
+  const std::optional<double> gap = gap_of(scores);
+  if (!gap) return std::nullopt;
+  return (scores.final_ - scores.tuned) / *gap;
 }
 
-std::optional<bool> closes_half(const FreshScores& scores, double least_gap) {
-  const double gap = scores.truth - scores.tuned;
-  if (!(gap >= least_gap)) return std::nullopt;
-  return scores.corrected.value_or(scores.final_) - scores.tuned >= gap / 2;
+std::optional<bool> closes_half(const FreshScores& scores) {
+  const std::optional<double> gap = gap_of(scores);
+  if (!gap) return std::nullopt;
+  return scores.corrected.value_or(scores.final_) - scores.tuned >= *gap / 2;
 }
 
 ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Reported> reported) {

@@ -24,12 +24,12 @@ struct FreshScores {
 };
 
 // (final - tuned) / (truth - tuned): the share of the explainable gap that really went.  None where
-// there is too little to explain (below `least_gap`, nats a trial) for the share to mean anything.
-std::optional<double> realised_shrinkage(const FreshScores& scores, double least_gap = 0.02);
+// there is too little to explain (0.02 nats a trial) for the share to mean anything.
+std::optional<double> realised_shrinkage(const FreshScores& scores);
 
 // Whether model.toml, its [residual] included, closes half of what the truth does.  None where
 // there is too little to close.
-std::optional<bool> closes_half(const FreshScores& scores, double least_gap = 0.02);
+std::optional<bool> closes_half(const FreshScores& scores);
 
 struct ScoredCase {
   Truth truth;  // foreign cases without a truth: the id alone

@@ -234,10 +234,10 @@ TEST(MissedBelow, IsWhatTheLogCouldNotShow) {
 }
 
 TEST(Wilson, MatchesTheClosedForm) {
-  const RateInterval half = wilson_interval({50, 100});
+  const Interval half = wilson_interval({50, 100});
   EXPECT_NEAR(half.lower, 0.4038, 1e-4);
   EXPECT_NEAR(half.upper, 0.5962, 1e-4);
-  const RateInterval all = wilson_interval({60, 60});
+  const Interval all = wilson_interval({60, 60});
   EXPECT_NEAR(all.lower, 60 / (60 + 1.959964 * 1.959964), 1e-9);
   EXPECT_EQ(all.upper, 1);
   EXPECT_EQ(wilson_interval({0, 10}).lower, 0);

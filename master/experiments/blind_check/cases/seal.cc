@@ -15,6 +15,7 @@
 #include <sstream>
 
 #include "common/base/ranges.h"
+#include "common/json/fields.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
@@ -109,7 +110,11 @@ Result<Truth> parse_truth(const std::string& text, const std::string& file, cons
   if (!effects.is_object()) return wrong(file, "\"effects\" is " + json_text(effects));
   if (answer == "effect" && effects.empty()) return wrong(file, "\"effects\" is empty");
   Truth truth;
-  truth.id = json.value("case", Json()).is_string() ? json["case"].get<std::string>() : id;
+  truth.id = id;
+  const LenientFields fields(json);
+  fields.field("case", truth.id);
+  fields.field("level", truth.level);
+  fields.field("left_out", truth.excluded);
   const Json sizes = json.value("size", Json::object());
   for (const auto& [name, parameters] : effects.items()) {
     TrueEffect effect{name, {}, 1};
@@ -117,15 +122,9 @@ Result<Truth> parse_truth(const std::string& text, const std::string& file, cons
     for (const auto& [key, value] : parameters.items()) {
       if (const auto number = parameter_value(name, key, value)) effect.parameters[key] = *number;
     }
-    if (sizes.is_object() && sizes.contains(name) && sizes[name].is_number()) {
-      effect.size = sizes[name].get<double>();
-    }
+    LenientFields(sizes).field(name.c_str(), effect.size);
     truth.effects.push_back(std::move(effect));
   }
-  const Json level = json.value("level", Json());
-  if (level.is_string()) truth.level = level.get<std::string>();
-  const Json excluded = json.value("left_out", Json());
-  if (excluded.is_string()) truth.excluded = excluded.get<std::string>();
   const Json seed = json.value("seed", Json());
   if (seed.is_number_unsigned()) truth.seed = seed.get<std::uint64_t>();
   const Json robot = json.value("robot", Json::object());

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kLeastStrength = 1e-6;  // of the bound: nothing smaller is an effect
 constexpr unsigned kMostSteps = 40;
+constexpr double kTolerance = 0.01;  // of the excess
 
 double middle(double lower, double upper, Stream& stream) {
   return stream.uniform(lower + 0.25 * (upper - lower), lower + 0.75 * (upper - lower));
@@ -110,8 +111,7 @@ std::optional<double> size_of(const v1::PredictResult& base, const v1::PredictRe
   return sum / std::max(1, base.predictions_size());
 }
 
-StrengthSearch::StrengthSearch(double target, double tolerance)
-    : target_(target), tolerance_(tolerance), strength_(kFirstStrength) {}
+StrengthSearch::StrengthSearch(double target) : target_(target) {}
 
 void StrengthSearch::tell(std::optional<double> size) {
   ++evaluated_;
@@ -121,7 +121,7 @@ void StrengthSearch::tell(std::optional<double> size) {
   } else {
     size_ = *size;
     const double share = (*size - 1) / (target_ - 1);
-    if (std::abs(share - 1) <= tolerance_) {
+    if (std::abs(share - 1) <= kTolerance) {
       state_ = State::kFound;
       return;
     }

@@ -62,8 +62,8 @@ std::optional<double> size_of(const v1::PredictResult& base, const v1::PredictRe
 // kept within the bracket.
 class StrengthSearch {
  public:
-  // REQUIRES: target > 1.  Done within `tolerance` of the excess.
-  explicit StrengthSearch(double target, double tolerance = 0.01);
+  // REQUIRES: target > 1.  Done within a hundredth of the excess.
+  explicit StrengthSearch(double target);
 
   bool done() const { return state_ != State::kSearching; }
   bool found() const { return state_ == State::kFound; }
@@ -81,9 +81,8 @@ class StrengthSearch {
   void propose();
 
   double target_;
-  double tolerance_;
   State state_ = State::kSearching;
-  double strength_;
+  double strength_ = kFirstStrength;
   double size_ = 1;
   std::optional<Point> below_, above_;
   unsigned evaluated_ = 0;
