@@ -283,28 +283,22 @@ Result<std::vector<DrivenRun>> drive_commands(const Mover& mover, const Pose& X_
 }
 
 Result<WaypointPilot> make_pilot(std::span<const ConstantVelocity> models) {
-  WaypointPilot pilot;
-  double best_ahead = 0, best_left = 0, best_right = 0;
   // Metres against radians as the corner of a robot sees them.
   constexpr double kHalfRobot_m = 0.05;
-  for (const ConstantVelocity& model : models) {
-    const double turn = kHalfRobot_m * model.turn_rad_s, speed = model.speed_m_s;
-    const double ahead = speed - 10 * std::abs(turn);
-    const double left = turn - std::abs(speed), right = -turn - std::abs(speed);
-    if (ahead > best_ahead) {
-      best_ahead = ahead;
-      pilot.forward = model;
-    }
-    if (left > best_left) {
-      best_left = left;
-      pilot.left = model;
-    }
-    if (right > best_right) {
-      best_right = right;
-      pilot.right = model;
-    }
-  }
-  if (best_ahead <= 0 || best_left <= 0 || best_right <= 0) {
+  using Model = ConstantVelocity;
+  const auto turn = [](const Model& m) { return kHalfRobot_m * m.turn_rad_s; };
+  const auto ahead = [&](const Model& m) { return m.speed_m_s - 10 * std::abs(turn(m)); };
+  const auto left = [&](const Model& m) { return turn(m) - std::abs(m.speed_m_s); };
+  const auto right = [&](const Model& m) { return -turn(m) - std::abs(m.speed_m_s); };
+  bool has_all = true;
+  const auto best = [&](const auto& suits) {
+    const auto found = std::ranges::max_element(models, {}, suits);
+    const bool does = found != models.end() && suits(*found) > 0;
+    has_all = has_all && does;
+    return does ? *found : Model{};
+  };
+  const WaypointPilot pilot{best(ahead), best(left), best(right)};
+  if (!has_all) {
     return Error{
         "way-points take a command that goes ahead and one each that turns left and right on the "
         "spot; the model's commands have none"};
