@@ -151,12 +151,7 @@ Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& conf
   LongCommand::begin_if_possible("plan", options.keep.place("plan", options.out),
                                  {{"candidates", 10, 0}, {"what they show", 3, 0}}, context);
   ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
-  context.work->stage(0);
-  bool first = true;
-  return plan::design_plan(*asked, config, options.settings, [&](const std::string& /*what*/) {
-    if (!first) context.work->stage(1);
-    first = false;
-  });
+  return plan::design_plan(*asked, config, options.settings, context.work->hooks());
 }
 
 Result<int> run_plan(PlanOptions& options, CliContext& context) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "master/diagnose/subject.h"
@@ -62,7 +63,7 @@ class Designer {
   // Where the model stops, without any noise.
   Result<TrialLog> driven(const Sessions& plan);
   Result<Signals> signals_of(const TrialLog& log) {
-    return signals(farm_, config_.problem, log, {effects_, 4, settings_.seed});
+    return signals(farm_, config_.problem, log, {effects_, settings_.seed});
   }
   Result<std::vector<Chain>> choose(double* best_share);
   // Whether all of these trials end within the arena.
@@ -83,8 +84,7 @@ class Designer {
 
 Status Designer::choose_effects(DesignedPlan* plan) {
   const std::span<const Effect> catalogue = config_.problem.table().effects();
-  std::vector<std::string> known;
-  for (const Effect& effect : catalogue) known.push_back(effect.name);
+  const std::vector<std::string> known = mapped(catalogue, &Effect::name);
   for (const std::string& name : settings_.effects.empty() ? known : settings_.effects) {
     const auto found = std::ranges::find(known, name);
     if (found == known.end()) {
@@ -116,10 +116,7 @@ Sessions Designer::draw(unsigned times, std::uint64_t seed) const {
 }
 
 Result<TrialLog> Designer::driven(const Sessions& plan) {
-  Problem problem = config_.problem;
-  problem.log = {};
-  problem.genes.clear();
-  problem.fitness.kind = FitnessKind::kLogScore;
+  Problem problem = without_log(config_.problem);
   for (const NoiseRow& noise : {subject_->drive_common, subject_->drive_side,
                                 subject_->pose_position, subject_->pose_heading}) {
     problem.values[noise.row] = problem.table()[noise.row].lower;
@@ -228,10 +225,7 @@ std::vector<PowerPoint> Designer::power(const Signals& planned, const TrialLog& 
 // Of the same effects in the same order.
 void keep_common(std::vector<Visibility>* a, std::vector<Visibility>* b) {
   const auto lacks = [](const std::vector<Visibility>& all) {
-    return [&all](const Visibility& v) {
-      return std::ranges::none_of(
-          all, [&](const Visibility& other) { return other.effect == v.effect; });
-    };
+    return [&all](const Visibility& v) { return !contains(all, v.effect, &Visibility::effect); };
   };
   std::erase_if(*a, lacks(*b));
   std::erase_if(*b, lacks(*a));
@@ -254,24 +248,20 @@ std::optional<double> trials_as_good(const std::vector<PowerPoint>& power) {
 }
 
 Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSettings& settings,
-                                 const PlanProgress& progress) {
+                                 const StageHooks& hooks) {
+  hooks.began(0);
   if (diagnosis_subject(config.problem) == nullptr) {
     return Error{"scenario " + config.problem.scenario +
                  " cannot be diagnosed, so there is nothing to plan for"};
   }
-  const auto log_stage = [&](const std::string& what) {
-    if (progress) progress(what);
-  };
   DesignedPlan plan;
   Designer designer(farm, config, settings);
   RETURN_IF_ERROR(designer.choose_effects(&plan));
-  log_stage("candidates");
   ASSIGN_OR_RETURN(const auto chains, designer.choose(&plan.best_share));
-  log_stage("what the plan shows");
+  hooks.began(1);
   const SimulateSettings& simulate = config.simulate;
   ASSIGN_OR_RETURN(auto log, designer.driven(dealt(chains, simulate.sessions, simulate.pause_s)));
   ASSIGN_OR_RETURN(const auto planned, designer.signals_of(log));
-  log_stage("what a random one shows");
   ASSIGN_OR_RETURN(auto random, designer.driven(designer.draw(1, settings.seed + 1)));
   ASSIGN_OR_RETURN(const auto at_random, designer.signals_of(random));
   plan.seen = visibility(config.problem, planned);
@@ -279,9 +269,7 @@ Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSet
   keep_common(&plan.seen, &plan.seen_at_random);
   for (const std::size_t effect : designer.effects()) {
     const std::string& name = config.problem.table().effects()[effect].name;
-    if (std::ranges::none_of(plan.seen, [&](const Visibility& v) { return v.effect == name; })) {
-      plan.without_shift.push_back(name);
-    }
+    if (!contains(plan.seen, name, &Visibility::effect)) plan.without_shift.push_back(name);
   }
   plan.power = designer.power(planned, log, at_random, random, plan.seen_at_random);
   plan.log = std::move(log);

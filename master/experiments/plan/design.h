@@ -3,13 +3,13 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/config/settings.h"
+#include "common/progress/overall_progress.h"
 #include "common/trials/trial.h"
 #include "master/experiments/plan/visibility.h"
 #include "master/farm/farm.h"
@@ -46,14 +46,13 @@ struct DesignedPlan {
   std::vector<std::string> without_shift;    // that could not be simulated
 };
 
-using PlanProgress = std::function<void(const std::string& what)>;
-
 // Draws `pool` times the chains that are wanted, as the config's [simulate] has them (levels,
 // durations, chain, arena), omits those that leave the arena, and takes those that show most
 // (selection.h) in that order: whoever stops early has driven the best of them.  Pure: the same for
-// one config, settings and build.  Errors: a scenario without a diagnosis; an unknown effect; too
-// few chains that stay in the arena; the farm's; a robot that does not drive.
+// one config, settings and build.  Its stages: candidates, what they show.  Errors: a scenario
+// without a diagnosis; an unknown effect; too few chains that stay in the arena; the farm's; a
+// robot that does not drive.
 Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSettings& settings,
-                                 const PlanProgress& progress = {});
+                                 const StageHooks& hooks = {});
 
 }  // namespace gapfarm::plan

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <map>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/diagnose/subject.h"
+#include "master/farm/planned_trials.h"
 #include "master/infer/certificate.h"
 #include "master/infer/predictor.h"
 
@@ -41,6 +43,7 @@ class LogDeterminant {
 };
 
 constexpr double kPower = 0.9;
+constexpr unsigned kDraws = 4;    // an effect: directions and places
 constexpr int kMostHalvings = 4;  // where the robot cannot be simulated at the first strength
 
 NoiseEstimate noise_of(const DiagnosisSubject& subject, const ParameterValues& values) {
@@ -161,10 +164,8 @@ Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
                         const SignalSettings& settings) {
   const std::shared_ptr<const DiagnosisSubject> keeps_subject = diagnosis_subject(problem);
   const DiagnosisSubject& subject = *keeps_subject;
-  Problem planned = problem;
+  Problem planned = without_log(problem);
   planned.log = log;
-  planned.genes.clear();
-  planned.fitness.kind = FitnessKind::kLogScore;
   ASSIGN_OR_RETURN(auto study, subject.make_study(planned, problem.genes));
   Predictor predictor(farm, planned);
   RETURN_IF_ERROR(subject.tune(predictor, true, &study));
@@ -175,7 +176,7 @@ Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
   const Arena arena = arena_of(log, 0);
   for (const std::size_t effect : settings.effects) {
     if (!planned.table().effects()[effect].moves_means()) continue;
-    for (unsigned d = 0; d < settings.draws; ++d) {
+    for (unsigned d = 0; d < kDraws; ++d) {
       Stream stream({settings.seed, Purpose::kSimulation, 2, effect, d});
       found.shifts.push_back(
           {draw_effect(planned.table(), effect, arena, stream), kFirstStrength, {}});
@@ -219,10 +220,9 @@ double mean_power(const Problem& problem, const Signals& signals,
   double sum = 0;
   std::size_t count = 0;
   for (const auto& [effect, shifts] : by_effect(signals)) {
-    const auto wanted = std::ranges::find_if(at, [&, name = effect](const Visibility& v) {
-      return v.effect == problem.table().effects()[name].name;
-    });
-    if (wanted == at.end() || wanted->strength > 1) continue;
+    const std::string& name = problem.table().effects()[effect].name;
+    const Visibility* wanted = find_by(at, name, &Visibility::effect);
+    if (wanted == nullptr || wanted->strength > 1) continue;
     for (const Shift* shift : shifts) {
       const double times = wanted->strength / shift->strength;
       sum +=

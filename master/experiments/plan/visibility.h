@@ -74,7 +74,6 @@ struct Signals {
 
 struct SignalSettings {
   std::vector<std::size_t> effects;  // of the table; those on the spread alone have no shift
-  unsigned draws = 4;                // an effect: directions and places
   std::uint64_t seed = 1;
 };
 
