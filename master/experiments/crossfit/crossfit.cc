@@ -103,8 +103,8 @@ class Crossfit {
       return Error{"the simulation of " + name + " at the " + (k == 1 ? "tuned" : "config's own") +
                    " parameters ended with " + ends[k].failure};
     }
-    std::vector<Pose> starts, repeats;
-    for (const Trial& trial : log.trials) starts.push_back(trial.X_WS);
+    const std::vector<Pose> starts = mapped(log.trials, &Trial::X_WS);
+    std::vector<Pose> repeats;
     std::vector<TrialColumnReader> condition;
     for (const std::string& column : plan_.repeats) {
       ASSIGN_OR_RETURN(const auto reader, trial_column_reader(log, column));
