@@ -68,7 +68,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
                                                   options.seed, options.memo));
     question = std::move(asked);
   }
-  if (Status s = exclude(options.excluded, &question.catalogue); !s) return s.error();
+  RETURN_IF_ERROR(exclude(options.excluded, &question.catalogue));
   if (log.relative && !options.reference) {
     clock.begin(kFaultStage);
     ASSIGN_OR_RETURN(auto sensed, sense(robot, options, &log, &question));

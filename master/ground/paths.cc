@@ -114,7 +114,7 @@ Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const Paramet
   Problem asked = fitted;
   asked.fitness.kind = FitnessKind::kLogScore;
   DrivenPaths paths;
-  if (Status s = put_stretches(runs, every_s, &asked, &paths); !s) return s.error();
+  RETURN_IF_ERROR(put_stretches(runs, every_s, &asked, &paths));
   ASSIGN_OR_RETURN(const auto before, simulated_ends(farm, asked));
   asked.values = values;
   ASSIGN_OR_RETURN(const auto after, simulated_ends(farm, asked));

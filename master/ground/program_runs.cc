@@ -99,12 +99,8 @@ class ProgramFarm {
   v1::Task task_at(const std::vector<double>& values) const {
     v1::Task task;
     v1::PredictTask* predict = task.mutable_predict();
-    for (std::size_t row = 0; row < values.size(); ++row) {
-      if (values[row] == problem_.values[row]) continue;
-      v1::Override* override = predict->mutable_point()->add_overrides();
-      override->set_parameter(static_cast<std::uint32_t>(row));
-      override->set_value(values[row]);
-    }
+    const std::vector<v1::Override> overrides = overrides_of(problem_.values, values);
+    predict->mutable_point()->mutable_overrides()->Add(overrides.begin(), overrides.end());
     predict->set_means_only(true);
     return task;
   }

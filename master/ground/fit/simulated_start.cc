@@ -77,7 +77,7 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   std::vector<Hold> holds = mapped(starts, [](const Genome& start) { return Hold{start, 1}; });
   ASSIGN_OR_RETURN(auto looks, look_at(starts, holds));
   for (int round = 0; round < 2; ++round) {
-    if (Status s = settle(&looks, holds, first); !s) return s.error();
+    RETURN_IF_ERROR(settle(&looks, holds, first));
   }
   for (std::size_t k = 0; k < looks.size(); ++k) {
     std::optional<At>& look = looks[k];
@@ -139,7 +139,7 @@ Result<std::optional<Climb>> SimulationFit::firm_climb() {
   ASSIGN_OR_RETURN(auto look, look_at({firm_}, {hold}));
   if (!look.front()) return std::optional<Climb>();
   Climb climb{*std::move(look.front()), hold};
-  if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
+  RETURN_IF_ERROR(climb_on(&climb, kMostRounds));
   return std::optional(std::move(climb));
 }
 
@@ -147,17 +147,16 @@ Result<std::optional<Climb>> SimulationFit::firm_climb() {
 Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
   const auto by_nats = [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; };
   for (Climb& climb : climbs) {
-    if (Status s = climb_on(&climb, kRaceRounds); !s) return s.error();
+    RETURN_IF_ERROR(climb_on(&climb, kRaceRounds));
   }
   std::erase_if(climbs, [](const Climb& climb) { return climb.slopes.empty(); });
   std::stable_sort(climbs.begin(), climbs.end(), by_nats);
   if (climbs.size() > 2) climbs.resize(2);
   for (Climb& climb : climbs) {
-    if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
+    RETURN_IF_ERROR(climb_on(&climb, kMostRounds));
   }
-  auto firm = firm_climb();
-  if (!firm) return firm.error();
-  if (*firm) climbs.push_back(**std::move(firm));
+  ASSIGN_OR_RETURN(auto firm, firm_climb());
+  if (firm) climbs.push_back(*std::move(firm));
   std::size_t best = 0;
   Hold held = climbs.front().hold;
   double least = INFINITY;
@@ -173,7 +172,7 @@ Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
   Climb chosen = std::move(climbs[best]);
   if (held.strength != chosen.hold.strength) {
     chosen.hold = held;
-    if (Status s = climb_again(&chosen); !s) return s.error();
+    RETURN_IF_ERROR(climb_again(&chosen));
   }
   ASSIGN_OR_RETURN(auto sharp, sharpen(std::move(chosen)));
   return weigh_worse(std::move(sharp));
@@ -200,10 +199,10 @@ Result<Climb> SimulationFit::sharpen(Climb best) {
     if (!plain_->sharpen(ends)) break;
     errors_->sharpen(ends);
     Climb next = best;
-    if (Status s = climb_again(&next); !s) return s.error();
+    RETURN_IF_ERROR(climb_again(&next));
     double cost = INFINITY;
     next.hold = best_hold(next, &cost);
-    if (Status s = climb_again(&next); !s) return s.error();
+    RETURN_IF_ERROR(climb_again(&next));
     const double before = predicted(held_out(best, best.hold)).cost;
     if (!(predicted(held_out(next, next.hold)).cost < before)) break;
     best = std::move(next);
@@ -222,7 +221,7 @@ Result<Climb> SimulationFit::weigh_worse(Climb best) {
     }
     errors_->emphasise(factors);
     Climb next = best;
-    if (Status s = climb_again(&next); !s) return s.error();
+    RETURN_IF_ERROR(climb_again(&next));
     if (predicted(held_out(next, next.hold)).cost >= predicted(ends).cost) break;
     best = std::move(next);
   }
@@ -295,14 +294,14 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   if (!first.front() || fitted_rows_.empty()) return found;
   const At begin = *first.front();
   std::vector<Climb> climbs = {{begin, hold}};
-  if (Status s = step(&climbs.front()); !s) return s.error();
+  RETURN_IF_ERROR(step(&climbs.front()));
   found.simulations = simulations_;
   if (climbs.front().slopes.empty()) return found;
   ASSIGN_OR_RETURN(auto others, other_climbs(climbs.front()));
   for (Climb& climb : others) climbs.push_back(std::move(climb));
   found.starts = climbs.size();
   ASSIGN_OR_RETURN(const auto best, best_of(std::move(climbs)));
-  if (Status s = judge(best, begin, &found); !s) return s.error();
+  RETURN_IF_ERROR(judge(best, begin, &found));
   found.simulations = simulations_;
   take_spread(best, widest, &found);
   return found;

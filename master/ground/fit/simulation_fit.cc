@@ -201,16 +201,17 @@ Status SimulationFit::step(Climb* climb) {
   if (Status s = look_round(climb); !s || climb->over) return s;
   climb->equations = equations_at(climb->at, climb->hold, climb->slopes);
   const bool worth_more = promised(*climb) >= kEnoughNats;
-  auto gained = try_steps(climb, kDampings);
-  if (gained && *gained == 0 && worth_more) gained = try_steps(climb, kGreatDampings);
-  if (!gained) return gained.error();
-  climb->over = *gained < kEnoughNats;
+  ASSIGN_OR_RETURN(double gained, try_steps(climb, kDampings));
+  if (gained == 0 && worth_more) {
+    ASSIGN_OR_RETURN(gained, try_steps(climb, kGreatDampings));
+  }
+  climb->over = gained < kEnoughNats;
   return {};
 }
 
 Status SimulationFit::climb_on(Climb* climb, int rounds) {
   for (int k = 0; k < rounds && !climb->over; ++k) {
-    if (Status s = step(climb); !s) return s;
+    RETURN_IF_ERROR(step(climb));
   }
   return {};
 }
