@@ -4,7 +4,16 @@
 
 #include <Eigen/Core>
 
+#include "common/base/ranges.h"
+
 namespace gapfarm {
+
+// What `of` makes of every item, a number each.
+template <class Range, class Of>
+Eigen::VectorXd vector_of(const Range& range, Of of) {
+  const std::vector<double> numbers = mapped(range, of);
+  return Eigen::VectorXd::Map(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+}
 
 struct SymmetricAxes {
   Eigen::VectorXd values;   // ascending

@@ -234,9 +234,9 @@ Json to_json(const DriveReport& report) {
   for (const DriverReport& d : report.drivers) {
     Json driver = {{"name", d.name}, {"runs", d.runs.size()}};
     if (d.real) {
-      driver["to_real_m"] = {{"lettier", d.real->lettier},
-                             {"hausdorff", d.real->hausdorff},
-                             {"frechet", d.real->frechet}};
+      driver["to_real_m"] = {{"lettier", d.real->lettier.median},
+                             {"hausdorff", d.real->hausdorff.median},
+                             {"frechet", d.real->frechet.median}};
     }
     Json ends = Json::array();
     for (const DrivenRun& run : d.runs) {

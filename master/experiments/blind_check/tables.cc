@@ -205,8 +205,7 @@ std::string reported_text(const ScoredCase& c) {
   std::string text = c.reported->verdict;
   for (const ReportedEffect& e : c.reported->effects) {
     text += " " + e.name;
-    for (std::size_t i = 0; i < e.aliases.size(); ++i) text += (i ? ", " : " (or ") + e.aliases[i];
-    if (!e.aliases.empty()) text += ")";
+    if (!e.aliases.empty()) text += " (or " + joined(e.aliases) + ")";
   }
   return text;
 }

@@ -129,8 +129,7 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
       rest = rest.subspan(part.count);
     }
   }
-  std::vector<ComparedRun> runs = mapped(lanes, [](Lane& lane) { return std::move(lane.run); });
-  return runs;
+  return mapped(lanes, [](Lane& lane) { return std::move(lane.run); });
 }
 
 CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {

@@ -12,6 +12,7 @@ namespace {
 
 // Shorter commands are not worth giving, but every run gets each, so that legs correspond.
 constexpr double kShortest_s = 0.01;
+constexpr double kLongest_s = 10;
 constexpr double kPause_s = 1;  // between commands of a list
 
 Trial planned_leg(const CommandSpec& command, std::size_t index, double t_s, const Pose& X_WS,
@@ -29,9 +30,9 @@ Trial planned_leg(const CommandSpec& command, std::size_t index, double t_s, con
   return trial;
 }
 
-CommandSpec lasting(const ConstantVelocity& model, double seconds, double longest_s) {
+CommandSpec lasting(const ConstantVelocity& model, double seconds) {
   CommandSpec command = model.command;
-  command.duration_s = std::clamp(seconds, kShortest_s, longest_s);
+  command.duration_s = std::clamp(seconds, kShortest_s, kLongest_s);
   return command;
 }
 
@@ -40,12 +41,12 @@ CommandSpec turn_toward(const WaypointPilot& pilot, const Pose& X_WR,
   const double bearing = std::atan2(target.y() - X_WR.y, target.x() - X_WR.x);
   const double error = wrap_angle(bearing - X_WR.theta);
   const ConstantVelocity& turn = error > 0 ? pilot.left : pilot.right;
-  return lasting(turn, error / turn.turn_rad_s, pilot.longest_s);
+  return lasting(turn, error / turn.turn_rad_s);
 }
 
 CommandSpec go_to(const WaypointPilot& pilot, const Pose& X_WR, const Eigen::Vector2d& target) {
   const double distance = std::hypot(target.x() - X_WR.x, target.y() - X_WR.y);
-  return lasting(pilot.forward, distance / pilot.forward.speed_m_s, pilot.longest_s);
+  return lasting(pilot.forward, distance / pilot.forward.speed_m_s);
 }
 
 // Appends one leg to every run; `choose` gives each its command.

@@ -70,7 +70,6 @@ Result<std::vector<DrivenRun>> drive_commands(const Mover& mover, const Pose& X_
 // What a way-point driver knows of the robot: how to turn and go ahead, and how fast that is.
 struct WaypointPilot {
   ConstantVelocity forward, left, right;
-  double longest_s = 10;  // of one command
 };
 // Out of the models' commands: the straightest that goes ahead and the two that turn most on the
 // spot.  Error: there are none.

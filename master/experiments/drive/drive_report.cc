@@ -26,11 +26,10 @@ LineChart floor_chart(const DriveReport& report) {
   chart.y_title = "y, m";
   chart.equal_axes = true;
   if (!report.real.empty()) {
-    chart.series.push_back(
-        {.name = "real path", .line = drawn(report.real), .lower = {}, .upper = {}});
+    chart.series.push_back({.name = "real path", .line = drawn(report.real)});
   }
   for (const DriverReport& driver : report.drivers) {
-    ChartSeries series{.name = driver.name, .line = {}, .lower = {}, .upper = {}};
+    ChartSeries series{.name = driver.name};
     if (driver.band) {
       for (const BandPoint& p : driver.band->points())
         series.line.push_back({p.middle.x, p.middle.y});
@@ -40,13 +39,12 @@ LineChart floor_chart(const DriveReport& report) {
     chart.series.push_back(std::move(series));
   }
   if (!report.targets.empty()) {
-    ChartSeries targets{.name = "way-points", .line = {}, .lower = {}, .upper = {}, .dots = true};
+    ChartSeries targets{.name = "way-points", .dots = true};
     for (const Eigen::Vector2d& t : report.targets) targets.line.push_back({t.x(), t.y()});
     chart.series.push_back(std::move(targets));
   }
   const DriverReport& first = report.drivers.front();
-  ChartSeries ends{
-      .name = "ends of " + first.name, .line = {}, .lower = {}, .upper = {}, .dots = true};
+  ChartSeries ends{.name = "ends of " + first.name, .dots = true};
   for (const DrivenRun& run : first.runs) {
     ends.line.push_back({run.back().path.back().pose.x, run.back().path.back().pose.y});
   }
@@ -63,7 +61,7 @@ LineChart band_chart(const DriveReport& report, int coordinate) {
   chart.y_title = kTitles[coordinate];
   for (const DriverReport& driver : report.drivers) {
     if (!driver.band) continue;
-    ChartSeries series{.name = driver.name, .line = {}, .lower = {}, .upper = {}};
+    ChartSeries series{.name = driver.name};
     for (const BandPoint& p : driver.band->points()) {
       const double at = static_cast<double>(p.leg) + p.share;
       const double middle = coordinate == 0 ? p.middle.x : coordinate == 1 ? p.middle.y : 0;
@@ -76,15 +74,15 @@ LineChart band_chart(const DriveReport& report, int coordinate) {
   return chart;
 }
 
-std::string with_interval(double value, const Interval& interval) {
-  return fmt::format("{:.3g} ({:.3g} to {:.3g})", value, interval.lower, interval.upper);
+std::string distance_text(const RunDistance& distance) {
+  return fmt::format("{:.3g} ({:.3g} to {:.3g})", distance.median, distance.middle_90.lower,
+                     distance.middle_90.upper);
 }
 
 std::vector<std::string> real_cells(const std::optional<RealDistances>& real) {
   if (!real) return {"–", "–", "–"};
-  return {with_interval(real->frechet, real->frechet_90),
-          with_interval(real->hausdorff, real->hausdorff_90),
-          with_interval(real->lettier, real->lettier_90)};
+  return {distance_text(real->frechet), distance_text(real->hausdorff),
+          distance_text(real->lettier)};
 }
 
 // A band is never thinner: m and rad.
@@ -148,11 +146,10 @@ RealDistances distances_to(std::span<const DrivenRun> runs, std::span<const Path
     hausdorff.push_back(hausdorff_distance(path, real));
     frechet.push_back(frechet_distance(path, real));
   }
-  const auto range = [](const std::vector<double>& v) {
-    return Interval{quantile(v, 0.05), quantile(v, 0.95)};
+  const auto over_runs = [](const std::vector<double>& v) {
+    return RunDistance{median(v), {quantile(v, 0.05), quantile(v, 0.95)}};
   };
-  return {median(lettier), median(hausdorff), median(frechet),
-          range(lettier),  range(hausdorff),  range(frechet)};
+  return {over_runs(lettier), over_runs(hausdorff), over_runs(frechet)};
 }
 
 std::string drive_text(const DriveReport& report) {
@@ -174,16 +171,15 @@ std::string drive_text(const DriveReport& report) {
     if (driver.real) {
       text += fmt::format(
           "  from the real path, m, median (5 % to 95 %): Frechet {}, Hausdorff {}, Lettier {}\n",
-          with_interval(driver.real->frechet, driver.real->frechet_90),
-          with_interval(driver.real->hausdorff, driver.real->hausdorff_90),
-          with_interval(driver.real->lettier, driver.real->lettier_90));
+          distance_text(driver.real->frechet), distance_text(driver.real->hausdorff),
+          distance_text(driver.real->lettier));
     }
   }
   if (report.real_to_targets) {
     text += fmt::format(
         "straight lines between the way-points\n  from the real path, m: Frechet {:.3g}, Hausdorff "
         "{:.3g}\n",
-        report.real_to_targets->frechet, report.real_to_targets->hausdorff);
+        report.real_to_targets->frechet.median, report.real_to_targets->hausdorff.median);
   }
   return text;
 }

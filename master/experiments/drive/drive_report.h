@@ -61,10 +61,15 @@ EndEllipse end_ellipse(std::span<const DrivenRun> runs, double coverage);
 std::vector<PathPoint> floor_path(const DrivenRun& run, double spacing_m);
 std::vector<PathPoint> floor_path(std::span<const PathSample> path, double spacing_m);
 
-// Distances of one driver's runs to a real path: medians over runs, m, with 5 % and 95 %.
+// Over runs, m.
+struct RunDistance {
+  double median = 0;
+  Interval middle_90;  // 5 % and 95 %
+};
+
+// Distances of one driver's runs to a real path.
 struct RealDistances {
-  double lettier = 0, hausdorff = 0, frechet = 0;
-  Interval lettier_90, hausdorff_90, frechet_90;
+  RunDistance lettier, hausdorff, frechet;
 };
 RealDistances distances_to(std::span<const DrivenRun> runs, std::span<const PathPoint> real,
                            double spacing_m);

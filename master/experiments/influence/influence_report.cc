@@ -106,9 +106,8 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
   growth.x_title = "s compared";
   growth.y_title = "m, median over pairs of repeats";
   growth.log_y = true;
-  ChartSeries apart{.name = "apart", .line = {}, .lower = {}, .upper = {}};
-  ChartSeries allowed{
-      .name = "allowed share of the path's extent", .line = {}, .lower = {}, .upper = {}};
+  ChartSeries apart{.name = "apart"};
+  ChartSeries allowed{.name = "allowed share of the path's extent"};
   for (const HorizonPoint& point : report.horizons) {
     apart.line.push_back({point.horizon_s, point.repeat_distance});
     allowed.line.push_back({point.horizon_s, settings.chaos_share * point.extent});

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/random/stream.h"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr double kMemory_s = 5;  // for which a command before a move still shows in it
 constexpr double kRest_s = 1;    // at the end
+constexpr double kPoseEvery_s = 0.1;
 constexpr double kMoves_s[] = {0.5, 1, 2, 4};
 constexpr double kLevels[] = {-1, -0.5, 0, 0.5, 1};
 
@@ -85,10 +87,10 @@ class Planner {
   }
 
   Status find_wanted() {
-    for (const KinematicRow& row : rows_) {
-      if (settings_.wanted.empty()) wanted_.push_back({row.name, 0});
+    wanted_ = settings_.wanted;
+    if (wanted_.empty()) {
+      wanted_ = mapped(rows_, [](const KinematicRow& row) { return Wanted{row.name, 0}; });
     }
-    for (const Wanted& wanted : settings_.wanted) wanted_.push_back(wanted);
     for (const Wanted& wanted : wanted_) {
       const auto found = std::ranges::find(rows_, wanted.name, &KinematicRow::name);
       if (found == rows_.end()) {
@@ -150,7 +152,7 @@ class Planner {
       t += move.seconds;
     }
     const auto count =
-        static_cast<std::size_t>(std::max(1.0, std::round((t - t_s_) / settings_.pose_every_s)));
+        static_cast<std::size_t>(std::max(1.0, std::round((t - t_s_) / kPoseEvery_s)));
     for (std::size_t i = 0; i <= count; ++i) {
       path.times_s.push_back(t_s_ +
                              (t - t_s_) * static_cast<double>(i) / static_cast<double>(count));
@@ -306,9 +308,7 @@ std::optional<double> seconds_until(const DrivePlan& plan, const std::vector<Wan
   const auto spread = [&](const Eigen::VectorXd& widths) {
     double sum = 0;
     for (std::size_t k = 0; k < plan.rows.size(); ++k) {
-      const bool of_it = wanted.empty() || std::ranges::any_of(wanted, [&](auto& w) {
-                           return w.name == plan.rows[k].name;
-                         });
+      const bool of_it = wanted.empty() || contains(wanted, plan.rows[k].name, &Wanted::name);
       if (of_it) sum += std::log(std::max(widths[static_cast<Eigen::Index>(k)], 1e-12));
     }
     return sum;

@@ -25,8 +25,7 @@ struct DriveSettings {
   double length_m = 4, width_m = 4;  // floor for the marker, along and across the first heading
   std::vector<Interval> limits;      // of each channel's command
   std::vector<Wanted> wanted;        // empty: all
-  double pose_every_s = 0.1;
-  unsigned pool = 150;  // pairs of moves to choose each from
+  unsigned pool = 150;               // pairs of moves to choose each from
   bool random = false;
   std::uint64_t seed = 1;
 };

@@ -6,6 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/math/algebra.h"
 #include "common/score/kinematic_start.h"
 
 namespace gapfarm {
@@ -103,11 +104,7 @@ NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) 
 }
 
 Eigen::VectorXd SimulationFit::fitted_values(const Genome& genome) const {
-  Eigen::VectorXd values(fitted_rows_.size());
-  for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
-    values[k] = genome[fitted_rows_[k]];
-  }
-  return values;
+  return vector_of(fitted_rows_, [&](std::size_t gene) { return genome[gene]; });
 }
 
 Genome SimulationFit::moved(const At& at, const NormalEquations& equations) const {

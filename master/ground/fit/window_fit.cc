@@ -51,11 +51,7 @@ std::vector<FitRow> held_rows(const std::vector<KinematicRow>& rows) {
 }
 
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    values[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
-  }
-  return values;
+  return vector_of(rows, [](const FitRow& row) { return row.row.nominal; });
 }
 
 WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,

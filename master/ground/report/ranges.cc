@@ -141,25 +141,20 @@ Result<Ranges> ranges_of(const Diagnosis& diagnosis) {
   const auto n = static_cast<Eigen::Index>(ranges.values.size());
   Eigen::MatrixXd r = Eigen::MatrixXd::Identity(n, n);
   const auto index = [&](const std::string& key) {
-    const auto found = std::find_if(ranges.values.begin(), ranges.values.end(),
-                                    [&](const ValueRange& range) { return range.name == key; });
+    const auto found = std::ranges::find(ranges.values, key, &ValueRange::name);
     return found == ranges.values.end() ? -1 : found - ranges.values.begin();
   };
   for (const ParameterCorrelation& c : diagnosis.correlations) {
     const auto a = index(c.a), b = index(c.b);
     if (a >= 0 && b >= 0 && a != b) r(a, b) = r(b, a) = c.r;
   }
-  Eigen::VectorXd sd(n);
-  for (Eigen::Index k = 0; k < n; ++k) sd[k] = ranges.values[static_cast<std::size_t>(k)].sd;
+  const Eigen::VectorXd sd = vector_of(ranges.values, &ValueRange::sd);
   ranges.covariance = sd.asDiagonal() * r * sd.asDiagonal();
   return ranges;
 }
 
 Eigen::VectorXd means_of(const Ranges& ranges) {
-  Eigen::VectorXd means(static_cast<Eigen::Index>(ranges.values.size()));
-  std::transform(ranges.values.begin(), ranges.values.end(), means.begin(),
-                 [](const ValueRange& range) { return range.mean; });
-  return means;
+  return vector_of(ranges.values, &ValueRange::mean);
 }
 
 Eigen::MatrixXd draw_values(const Ranges& ranges, int count, std::uint64_t seed) {
@@ -167,11 +162,8 @@ Eigen::MatrixXd draw_values(const Ranges& ranges, int count, std::uint64_t seed)
   const SymmetricAxes axes = axes_of_symmetric(correlation_of(ranges));
   const Eigen::MatrixXd root =
       sd.asDiagonal() * axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal();
-  Eigen::VectorXd lower(means.size()), upper(means.size());
-  for (Eigen::Index k = 0; k < means.size(); ++k) {
-    lower[k] = ranges.values[static_cast<std::size_t>(k)].lower;
-    upper[k] = ranges.values[static_cast<std::size_t>(k)].upper;
-  }
+  const Eigen::VectorXd lower = vector_of(ranges.values, &ValueRange::lower);
+  const Eigen::VectorXd upper = vector_of(ranges.values, &ValueRange::upper);
   Eigen::MatrixXd draws(means.size(), count);
   for (int d = 0; d < count; ++d) {
     Stream stream({seed, Purpose::kStatistics, 5, static_cast<std::uint64_t>(d), 0});

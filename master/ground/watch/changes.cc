@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/math/algebra.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
@@ -39,8 +40,7 @@ struct Scaled {
 };
 
 VectorXd tolerances_of(const WatchedRows& rows) {
-  const std::vector<double> all = mapped(rows.rows, &KinematicRow::tolerance);
-  return VectorXd::Map(all.data(), static_cast<Index>(all.size()));
+  return vector_of(rows.rows, &KinematicRow::tolerance);
 }
 
 Scaled scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots) {

@@ -12,9 +12,9 @@ namespace gapfarm {
 
 struct ChartSeries {
   std::string name;
-  std::vector<SvgPoint> line;          // data units
-  std::vector<SvgPoint> lower, upper;  // ends of a band; empty: none
-  bool dots = false;                   // a dot a point in place of the line
+  std::vector<SvgPoint> line = {};               // data units
+  std::vector<SvgPoint> lower = {}, upper = {};  // ends of a band; empty: none
+  bool dots = false;                             // a dot a point in place of the line
 };
 
 struct ChartLevel {  // a horizontal line

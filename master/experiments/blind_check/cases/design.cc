@@ -295,17 +295,11 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
     const auto row = table.find(spread.key);
     if (!row) continue;
     const double factor = std::pow(spread.factor, stream.uniform(-1, 1));
-    double lower = table[*row].lower;
-    double upper = table[*row].upper;
-    bool free = problem.genes.empty() || spread.noise;
-    for (const Gene& gene : problem.genes) {
-      if (gene.row != *row) continue;
-      free = true;
-      lower = gene.lower;
-      upper = gene.upper;
-    }
-    const double value = problem.values[*row];
-    if (free) robot[spread.key] = std::clamp(factor * value, lower, upper);
+    const Gene* gene = find_by(problem.genes, *row, &Gene::row);
+    if (!gene && !problem.genes.empty() && !spread.noise) continue;
+    const double lower = gene ? gene->lower : table[*row].lower;
+    const double upper = gene ? gene->upper : table[*row].upper;
+    robot[spread.key] = std::clamp(factor * problem.values[*row], lower, upper);
   }
   return robot;
 }
