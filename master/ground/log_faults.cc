@@ -130,12 +130,11 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
         settled ? std::nullopt : find_ground_fault(robot, search->log, question, work.windows);
     ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, work.windows));
     search->windows = std::move(windows);
-    search->rows = held_rows(question.rows);
     const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
-    search->fit = fitter.fit(search->rows);
+    search->fit = fitter.fit(held_rows(question.rows));
     // Values a little off must not do as well, nor must a clock that is far off.
     if (!fault || fault->objective < search->fit.objective) break;
-    const double delayed = objective_with_own_clock(fitter, search->rows, search->fit.values);
+    const double delayed = objective_with_own_clock(fitter, search->fit.rows, search->fit.values);
     if (fault->objective < delayed) break;
     search->faults.push_back(*fault);
     search->log = std::move(fault->log);
@@ -145,13 +144,13 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
     search->log = without(std::move(search->log), search->jumps);
     ASSIGN_OR_RETURN(search->windows, question.windows(robot, search->log, work.windows));
     search->fit =
-        WindowFitter(robot, search->windows, question.reference, work.memo).fit(search->rows);
+        WindowFitter(robot, search->windows, question.reference, work.memo).fit(search->fit.rows);
   }
   if (!search->windows.noise.empty()) {
     const WindowFitter as_stated(robot, search->windows, question.reference, work.memo);
     search->windows.least_noise = as_stated.likeliest_least_noise(search->fit);
     const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
-    search->fit = fitter.fit(search->rows);
+    search->fit = fitter.fit(search->fit.rows);
   }
   search->grid = grid_of(search->log);  // in metres by now
   return {};

@@ -20,7 +20,7 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
               const std::vector<Eigen::MatrixXd>& slopes, std::size_t index, WindowFit* fit) {
   const GroundHypothesis& hypothesis = search.catalogue[index];
   Eigen::VectorXd values = search.fit.values;
-  const std::vector<FitRow> rows = with_freed(search.rows, hypothesis, &values);
+  const std::vector<FitRow> rows = with_freed(search.fit.rows, hypothesis, &values);
   const Eigen::VectorXd here = values;
   if (hypothesis.propose) values = hypothesis.propose(fitter, search.fit, rows, here);
   if (values == here) {
@@ -42,8 +42,8 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
 bool chosen_before(const GroundSearch& search, std::size_t index) {
   // Rows of what is offered that are free already have nothing to show.
   for (const KinematicRow& row : search.catalogue[index].freed) {
-    const Eigen::Index at = row_index(search.rows, row.name);
-    if (at < 0 || !search.rows[at].free) return false;
+    const Eigen::Index at = row_index(search.fit.rows, row.name);
+    if (at < 0 || !search.fit.rows[at].free) return false;
   }
   return true;
 }
@@ -88,7 +88,7 @@ Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
   // What gains most may show only once the others have moved a little.
   Candidate beside = candidate;
   beside.moved = true;
-  beside.before = fit_held_out(fitter, search.rows, search.fit.values);
+  beside.before = fit_held_out(fitter, search.fit.rows, search.fit.values);
   measure(beside);
   return may_be_named(beside.held_out_gain) ? beside : candidate;
 }
@@ -140,7 +140,6 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
   }
   search->steps.push_back(std::move(step));
   search->fit = chosen.fit;
-  search->rows = chosen.fit.rows;
   search->chain.push_back(chosen.held_out);
   search->moved = chosen.moved;
 }
@@ -272,10 +271,10 @@ namespace {
 
 // What everything that was tried would still close.
 void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
-  std::vector<FitRow> all = search->rows;
+  std::vector<FitRow> all = search->fit.rows;
   for (FitRow& row : all) row.free = true;
   search->free_fit = fitter.fit(all, {}, search->fit.values);
-  WindowFit moved = fit_held_out(fitter, search->rows, search->fit.values);
+  WindowFit moved = fit_held_out(fitter, search->fit.rows, search->fit.values);
   const WindowFit named = search->chain.back();
   const WindowFit& before = search->reference ? moved : named;
   WindowFit best = before;

@@ -90,8 +90,7 @@ struct GroundWork {
 struct GroundNames {
   std::vector<std::vector<Offer>> offers;  // of each step, best first
   std::vector<GroundStep> steps;
-  std::vector<FitRow> rows;  // the file's with those chosen freed
-  WindowFit fit;
+  WindowFit fit;  // its rows are the file's with those chosen freed
   // Predictions of stretches that were held out: the file as it is, with the first thing that was
   // chosen, with the first two, ...
   std::vector<WindowFit> chain;

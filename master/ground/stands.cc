@@ -52,17 +52,17 @@ GroundNames with_names(const WindowFitter& fitter, const GroundWork& work,
     const GroundHypothesis& hypothesis = search.catalogue[step.chosen];
     hypotheses.push_back(step.chosen);
     Eigen::VectorXd values = again.fit.values;
-    const std::vector<FitRow> rows = with_freed(again.rows, hypothesis, &values);
+    const std::vector<FitRow> rows = with_freed(again.fit.rows, hypothesis, &values);
     take_values(search.fit, rows, &values);
     WindowFit fit = fitter.fit(rows, {}, values);
     const bool moved = again.moved && hypotheses.size() == steps.size();
     step.gain = gain_of(fitter, hypothesis, fit, again.fit);
-    step.before = moved ? fit_held_out(fitter, again.rows, again.fit.values) : again.chain.back();
+    step.before =
+        moved ? fit_held_out(fitter, again.fit.rows, again.fit.values) : again.chain.back();
     again.chain.push_back(moved ? fit_held_out(fitter, rows, fit.values)
                                 : held_out_with(fitter, search, hypotheses, fit));
     step.held_out = held_out_gain(search.windows, again.chain.back(), step.before, work.seed);
     again.steps.push_back(std::move(step));
-    again.rows = rows;
     again.fit = std::move(fit);
   }
   return again;

@@ -85,7 +85,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
     effect.alias_reason = "They move this robot alike on these runs.";
   }
   for (const KinematicRow& row : h.freed) {
-    if (const Eigen::Index j = row_index(search_.rows, row.name); j >= 0) {
+    if (const Eigen::Index j = row_index(search_.fit.rows, row.name); j >= 0) {
       effect.parameters.push_back(
           estimate_of(row, search_.fit.values[j], intervals_(j, 0), intervals_(j, 1)));
     }
@@ -323,8 +323,8 @@ void GroundReport::name_headline() {
 
 std::vector<ReportedValue> GroundReport::reported_values() const {
   std::vector<ReportedValue> values;
-  for (std::size_t j = 0; j < search_.rows.size(); ++j) {
-    const FitRow& row = search_.rows[j];
+  for (std::size_t j = 0; j < search_.fit.rows.size(); ++j) {
+    const FitRow& row = search_.fit.rows[j];
     const double had = row.row.nominal, off = search_.fit.values[j] - had;
     const Interval interval = {intervals_(j, 0), intervals_(j, 1)};
     // What fits move without its name predicts as well, but costs as many nats as a name.
@@ -373,8 +373,8 @@ GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& sear
 
 Kinematics chosen_values(const GroundSearch& search, const std::vector<ReportedValue>& values) {
   Kinematics at;
-  for (std::size_t j = 0; j < search.rows.size(); ++j) {
-    const bool named = search.reference ? search.rows[j].free : values[j].named;
+  for (std::size_t j = 0; j < search.fit.rows.size(); ++j) {
+    const bool named = search.reference ? search.fit.rows[j].free : values[j].named;
     if (named) at.add(values[j].name, values[j].reported);
   }
   if (search.reference) search.reference->complete(&at);

@@ -333,8 +333,8 @@ std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& sea
 
 std::string values_that_would_move(const GroundSearch& search) {
   std::vector<std::pair<double, std::string>> moved;
-  for (std::size_t k = 0; k < search.rows.size(); ++k) {
-    const FitRow& row = search.rows[k];
+  for (std::size_t k = 0; k < search.fit.rows.size(); ++k) {
+    const FitRow& row = search.fit.rows[k];
     const double by = search.free_fit.values[k] - row.row.nominal;
     if (row.free || std::abs(by) < kMovedTolerances * row.row.tolerance) continue;
     moved.emplace_back(-std::abs(by) / row.row.tolerance, value_move(row, by));

@@ -26,8 +26,8 @@ void name_first(const std::string& name, const GroundNames& unnamed, const Windo
   std::vector<std::size_t> hypotheses;
   for (GroundStep& step : names.steps) {
     Eigen::VectorXd values = names.fit.values;
-    names.rows = with_freed(names.rows, search->catalogue[step.chosen], &values);
-    names.fit = fitter.fit(names.rows, {}, values);
+    const auto rows = with_freed(names.fit.rows, search->catalogue[step.chosen], &values);
+    names.fit = fitter.fit(rows, {}, values);
     hypotheses.push_back(step.chosen);
     step.before = names.chain.back();
     names.chain.push_back(held_out_with(fitter, *search, hypotheses, names.fit));
@@ -51,8 +51,7 @@ TEST(Stands, OnlyWhatIsWorthItsNameBesideTheOthers) {
   ASSERT_EQ(names_in(search), right);
   const WindowFitter fitter(robot, search.windows);
   GroundNames unnamed;
-  unnamed.rows = held_rows(question.rows);
-  unnamed.fit = fitter.fit(unnamed.rows, {}, {});
+  unnamed.fit = fitter.fit(held_rows(question.rows), {}, {});
   unnamed.chain = {search.chain.front()};
   const WindowFit alone = search.fit;
   name_first("clock_drift", unnamed, fitter, &search);
@@ -61,7 +60,7 @@ TEST(Stands, OnlyWhatIsWorthItsNameBesideTheOthers) {
   EXPECT_EQ(names_in(search), right);
   EXPECT_EQ(search.chain.size(), 2u);
   EXPECT_NEAR(search.fit.objective, alone.objective, 0.01);
-  EXPECT_NEAR(search.fit.values[row_index(search.rows, "separation")], 1.06, 0.01);
+  EXPECT_NEAR(search.fit.values[row_index(search.fit.rows, "separation")], 1.06, 0.01);
 }
 
 }  // namespace
