@@ -43,16 +43,20 @@ bool FloorParts::even() const {
 }
 
 double FloorParts::under(const Pose* X_WR, const RobotWheel& wheel) const {
-  if (X_WR == nullptr) return 1;
+  if (X_WR == nullptr || even()) return 1;
   const Pose at = *X_WR * Pose{wheel.x_m.value_or(0), wheel.y_m.value_or(0), 0};
   const Eigen::Vector2d place = Eigen::Vector2d(at.x, at.y) - origin_m_;
   double ratio = 1;
   for (const Parts* part : {&parts_, &known_}) {
     const Parts& p = *part;
-    const Eigen::Vector2d normal(std::cos(p.edge_rad), std::sin(p.edge_rad));
-    ratio *= ratio_beyond(p.edge_ratio, normal.dot(place) - p.edge_m) *
-             ratio_beyond(p.patch_ratio, p.patch_radius_m - std::hypot(place[0] - p.patch_x_m,
-                                                                       place[1] - p.patch_y_m));
+    if (p.edge_ratio != 1) {
+      const Eigen::Vector2d normal(std::cos(p.edge_rad), std::sin(p.edge_rad));
+      ratio *= ratio_beyond(p.edge_ratio, normal.dot(place) - p.edge_m);
+    }
+    if (p.patch_ratio != 1) {
+      const double from_middle = std::hypot(place[0] - p.patch_x_m, place[1] - p.patch_y_m);
+      ratio *= ratio_beyond(p.patch_ratio, p.patch_radius_m - from_middle);
+    }
   }
   return ratio;
 }
