@@ -16,7 +16,10 @@ constexpr double kFastest_m_s = 30;
 constexpr double kNearClocks_s = 60;
 // Of a clock more steps lead on, runs' beginnings and a few rows in disorder aside.
 constexpr double kLeastLeadOn = 0.75;
-constexpr double kMostUneven = 10;  // of what rows last, over their middle or below it
+constexpr double kLeastGrowth = 0.5;  // the same over the sum of all steps, whatever their sign
+// What rows last: the longest, s, and how uneven they are, over their middle or below it.
+constexpr double kLongestRow_s = 10;
+constexpr double kMostUneven = 10;
 
 // "Vicon x [mm]" to "vicon.x"; paths and blanks become dots, units in brackets go.
 std::string plain(const std::string& name) {
@@ -186,17 +189,24 @@ class Guess {
     to.source = table.topic;
     to.run = column_of(table, kRun);
     to.columns.push_back({"t", time, time_unit(table, time)});
-    to.intervals = lasts(numbers(table, time));
+    const std::string& unit = to.columns.back().unit;
+    to.intervals =
+        lasts(numbers(table, time), unit_factor(unit.empty() ? table.unit_of(time) : unit));
   }
 
   // Whether these are no times of a clock, but how long each row lasts.
-  static bool lasts(const std::vector<double>& times) {
-    double lead_on = 0;
-    for (std::size_t i = 1; i < times.size(); ++i) lead_on += times[i] > times[i - 1] ? 1 : 0;
+  static bool lasts(const std::vector<double>& times, double second) {
+    double lead_on = 0, steps = 0;
+    for (std::size_t i = 1; i < times.size(); ++i) {
+      lead_on += times[i] > times[i - 1] ? 1 : 0;
+      steps += std::abs(times[i] - times[i - 1]);
+    }
     if (lead_on >= kLeastLeadOn * (static_cast<double>(times.size()) - 1)) return false;
+    if (times.back() - times.front() > kLeastGrowth * steps) return false;
     const double middle = median(times);
     const auto [least, most] = std::ranges::minmax(times);
-    return least > middle / kMostUneven && most < middle * kMostUneven;
+    return least > middle / kMostUneven && most < middle * kMostUneven &&
+           most * second <= kLongestRow_s;
   }
 
   void guess_poses(const LogTable& table, const std::string& time, bool odometry) {

@@ -88,7 +88,11 @@ TEST(TextLogs, IncrementsOfRowsThatLast) {
   EXPECT_NEAR(last.t_s - run.poses.front().t_s, 1.7, 1e-9);
   ASSERT_TRUE(last.noise);
   EXPECT_NEAR((*last.noise)(2, 2), 4e-6, 1e-15);
-  // Where they lead on but for where runs begin, they are a clock's.
+  // Clocks lead on, be it in steps of many rows, or are too far on to be what a row lasts.
+  for (const char* rows : {"2.1,1,2,0,1,0\n2.1,1,2,0,1,0\n2.1,1,2,0,1,0\n2.2,1,2,0,1,0\n",
+                           "1600000003,1,2,0,1,0\n1600000001,1,2,0,1,0\n1600000002,1,2,0,1,0\n"}) {
+    EXPECT_FALSE(read({std::string("t,x,y,theta,v,w\n") + rows}).map.poses.intervals) << rows;
+  }
   const Read clock =
       read({"t,x,y,theta,v,w\n0,1,2,0,1,0\n1,1,2,0,1,0\n2,1,2,0,1,0\n3,1,2,0,1,0\n"
             "4,1,2,0,1,0\n5,1,2,0,1,0\n"});
