@@ -164,10 +164,5 @@ std::string MujocoRobot::robot_file() const {
 
 int main(int argc, char** argv) {
   using namespace gapfarm::truths;
-  return ground_log_program(
-      "differential|skid|tricycle",
-      [](const GroundSetting& s) -> std::unique_ptr<GroundTruth> {
-        return std::make_unique<MujocoRobot>(s);
-      },
-      argc, argv);
+  return ground_log_program("differential|skid|tricycle", make_truth<MujocoRobot>, argc, argv);
 }

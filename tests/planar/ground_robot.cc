@@ -208,10 +208,5 @@ std::string PlanarRobot::robot_file() const {
 
 int main(int argc, char** argv) {
   using namespace gapfarm::truths;
-  return ground_log_program(
-      "omni|mecanum|car",
-      [](const GroundSetting& s) -> std::unique_ptr<GroundTruth> {
-        return std::make_unique<PlanarRobot>(s);
-      },
-      argc, argv);
+  return ground_log_program("omni|mecanum|car", make_truth<PlanarRobot>, argc, argv);
 }

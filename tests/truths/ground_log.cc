@@ -65,10 +65,7 @@ void drive(GroundTruth& robot, std::mt19937& random, const std::string& folder) 
 
 }  // namespace
 
-int ground_log_program(
-    const char* kinds,
-    const std::function<std::unique_ptr<GroundTruth>(const GroundSetting&)>& engine, int argc,
-    char** argv) {
+int ground_log_program(const char* kinds, const GroundEngine& engine, int argc, char** argv) {
   if (argc != 7) {
     std::fprintf(stderr, "usage: %s %s tilt|edge|patch SIZE STIFFNESS SEED OUT\n", argv[0], kinds);
     return 2;

@@ -46,11 +46,15 @@ class GroundTruth {
   virtual std::string robot_file() const = 0;  // without its marker
 };
 
+using GroundEngine = std::function<std::unique_ptr<GroundTruth>(const GroundSetting&)>;
+
 // main() of a program KIND FLOOR SIZE STIFFNESS SEED OUT, which writes OUT/{config.toml,
 // robot.toml, log/, truth.txt}.
-int ground_log_program(
-    const char* kinds,
-    const std::function<std::unique_ptr<GroundTruth>(const GroundSetting&)>& engine, int argc,
-    char** argv);
+int ground_log_program(const char* kinds, const GroundEngine& engine, int argc, char** argv);
+
+template <class Truth>
+std::unique_ptr<GroundTruth> make_truth(const GroundSetting& setting) {
+  return std::make_unique<Truth>(setting);
+}
 
 }  // namespace gapfarm::truths
