@@ -160,8 +160,8 @@ double RobotDrive::throttle(double commanded, double dt_s, double yaw_rate_rad_s
   const double decay = push * t.back_emf + t.drag + t.cornering * std::abs(yaw_rate_rad_s);
   const double drives = std::copysign(push * t.gain, commanded) + floor.downhill;
   double next = (v + dt_s * drives) / (1 + dt_s * decay);
-  const double held = std::max(0.0, t.coulomb + floor.resists) *
-                      dt_s;  // dry friction stops, and does not turn round
+  // Dry friction stops, and does not turn round.
+  const double held = std::max(0.0, t.coulomb + floor.resists) * dt_s;
   next = std::abs(next) <= held ? 0 : next - std::copysign(held, next);
   throttle_m_s_ = next;
   return (v + next) / 2;

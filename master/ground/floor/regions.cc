@@ -222,11 +222,10 @@ struct Differs {
                      : Estimate{"ratio", ratio - 1, 0, 0, "-"};
   }
   std::string text(const Estimate& e) const {
-    const double sign = std::copysign(100, e.value), ends[] = {sign * e.lo, sign * e.hi};
-    const std::string share =
-        fmt::format("{:.{}f} % [{:.{}f}, {:.{}f}]", sign * e.value, throttled ? 1 : 0,
-                    std::min(ends[0], ends[1]), throttled ? 1 : 0, std::max(ends[0], ends[1]),
-                    throttled ? 1 : 0);
+    const double sign = std::copysign(100, e.value);
+    const auto [lo, hi] = std::minmax({sign * e.lo, sign * e.hi});
+    const std::string share = fmt::format("{0:.{3}f} % [{1:.{3}f}, {2:.{3}f}]", sign * e.value, lo,
+                                          hi, throttled ? 1 : 0);
     if (!throttled) return "travel " + share + (e.value < 0 ? " less far" : " farther");
     return "resist rolling by " + share + " of the weight " + (e.value > 0 ? "more" : "less");
   }
