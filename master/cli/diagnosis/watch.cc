@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -188,12 +189,18 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
         robot.runs, [&](const RunFolder& run) { return has_wheel_speeds(robot.robot, run.log); });
   });
   std::size_t all = 0, done = 0;
+  std::map<std::string, std::string> seen;  // logs, and whose they are
   for (const RobotFolder& robot : *robots) all += robot.runs.size();
   for (RobotFolder& robot : *robots) {
     WatchedRobot& to = fleet->robots.emplace_back(WatchedRobot{robot.name, {}, {}});
     for (RunFolder& run : robot.runs) {
       ++done;
       if (context.stop.requested()) return Error{"stopped", ErrorCode::kStopped};
+      const auto [first, fresh] = seen.try_emplace(log_hash(run.log), robot.name + "/" + run.name);
+      if (!fresh) {  // copied, or linked
+        fleet->skipped.push_back({robot.name, run.name, "repeats " + first->second});
+        continue;
+      }
       const GroundRobot driven = by_wheels ? driven_by_wheels(robot.robot, run.log) : robot.robot;
       const RunLog log = by_wheels ? driven_by_wheels(std::move(run.log)) : std::move(run.log);
       const std::string key =

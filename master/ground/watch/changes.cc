@@ -10,6 +10,7 @@
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
+#include "master/ground/watch/fleet_steps.h"
 #include "master/ground/watch/mixed_model.h"
 #include "master/infer/certificate.h"
 
@@ -20,32 +21,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kRounds = 40;      // of EM, from the priors
 constexpr int kWarmRounds = 4;   // from values nearby
 constexpr int kNullDraws = 400;  // of each kind
 constexpr double kCovered = 0.9;
-constexpr std::size_t kMostSteps = 12;
 constexpr double kOddWeight = 0.25;  // of a run that is off by itself
-
-struct Candidate {
-  std::size_t robot = 0, value = 0, onset = 0;
-  double statistic = 0;
-};
-
-// The fleet in tolerances.
-struct Scaled {
-  std::vector<RobotRuns> robots;
-  std::vector<VectorXd> directions;
-  VectorXd owned;  // variances
-};
 
 VectorXd tolerances_of(const WatchedRows& rows) {
   return vector_of(rows.rows, &KinematicRow::tolerance);
 }
 
-Scaled scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots) {
+ScaledFleet scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots) {
   const VectorXd per = tolerances_of(rows).cwiseInverse();
-  Scaled fleet;
+  ScaledFleet fleet;
   fleet.owned = rows.owned.cwiseProduct(per).cwiseAbs2();
   for (const WatchedValue& value : rows.values) {
     fleet.directions.push_back(value.direction.cwiseProduct(per));
@@ -61,50 +48,8 @@ Scaled scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>
   return fleet;
 }
 
-// The best step in each of the values.
-std::vector<Candidate> best_steps(const Scaled& fleet, const RunVariances& variances) {
-  std::vector<Candidate> best(fleet.directions.size());
-  for (std::size_t k = 0; k < best.size(); ++k) best[k].value = k;
-  for (std::size_t u = 0; u < fleet.robots.size(); ++u) {
-    const RobotFit fit = fit_robot(fleet.robots[u], variances);
-    const auto scores = score_steps(fit, fleet.robots[u], fleet.directions);
-    for (std::size_t k = 0; k < scores.size(); ++k) {
-      for (std::size_t i = 0; i < scores[k].size(); ++i) {
-        const double statistic = scores[k][i].statistic();
-        if (statistic > best[k].statistic) best[k] = {u, k, i, statistic};
-      }
-    }
-  }
-  return best;
-}
-
-// Of steps in each value the one that is farthest beyond its threshold; none: all are 0.
-Candidate best_of(const std::vector<Candidate>& steps, const std::vector<double>& thresholds = {}) {
-  const auto beyond = [&](const Candidate& step) {
-    return step.statistic - (thresholds.empty() ? 0 : thresholds[step.value]);
-  };
-  return *std::ranges::max_element(
-      steps, [&](const Candidate& a, const Candidate& b) { return beyond(a) < beyond(b); });
-}
-
-void add_step(const Candidate& step, Scaled* fleet) {
-  fleet->robots[step.robot].steps.push_back({step.onset, fleet->directions[step.value]});
-}
-
-// The best steps where variances and weights do not count the best one as scatter; both are left
-// so.
-std::vector<Candidate> best_steps_themselves(Scaled* fleet, int rounds, RunVariances* variances) {
-  const Candidate first = best_of(best_steps(*fleet, *variances));
-  if (first.statistic > 0) {
-    add_step(first, fleet);
-    estimate_variances(&fleet->robots, variances, rounds);
-    fleet->robots[first.robot].steps.pop_back();
-  }
-  return best_steps(*fleet, *variances);
-}
-
 // The robot that is farthest from the others in one value.
-OddRobot farthest_robot(const Scaled& fleet, const std::vector<RobotFit>& fits) {
+OddRobot farthest_robot(const ScaledFleet& fleet, const std::vector<RobotFit>& fits) {
   OddRobot best;
   const Index p = fleet.owned.size();
   for (std::size_t u = 0; u < fits.size(); ++u) {
@@ -125,21 +70,19 @@ OddRobot farthest_robot(const Scaled& fleet, const std::vector<RobotFit>& fits) 
   return best;
 }
 
-std::vector<RobotFit> fit_robots(const Scaled& fleet, const RunVariances& variances) {
+std::vector<RobotFit> fit_robots(const ScaledFleet& fleet, const RunVariances& variances) {
   return mapped(fleet.robots, [&](const RobotRuns& robot) { return fit_robot(robot, variances); });
 }
 
 // Runs of robots without changes: normal ones, with the covariances and variances of these; or
-// these themselves, the best step taken out, in another order.
+// these themselves, the fleet's steps taken out, in another order.
 class NullRuns {
  public:
-  NullRuns(const Scaled& fleet, const RunVariances& variances, const Candidate& step)
-      : fleet_(fleet), flat_(fleet) {
-    Scaled with = fleet;
-    if (step.statistic > 0) add_step(step, &with);
-    std::vector<RobotFit> fits = fit_robots(with, variances);
+  NullRuns(const ScaledFleet& fleet, const RunVariances& variances) : fleet_(fleet), flat_(fleet) {
+    std::vector<RobotFit> fits = fit_robots(fleet, variances);
     for (std::size_t u = 0; u < fits.size(); ++u) {
       flat_.robots[u].values = fits[u].residuals;
+      flat_.robots[u].steps.clear();
       auto& roots = roots_.emplace_back();
       for (const MatrixXd& covariance : fleet.robots[u].covariances) {
         MatrixXd V = variances.dispersion * covariance;
@@ -150,8 +93,8 @@ class NullRuns {
     between_ = estimate_shared(fits, fleet.owned, -1).between;
   }
 
-  Scaled draw(Stream* stream, bool in_order) const {
-    Scaled drawn = flat_;
+  ScaledFleet draw(Stream* stream, bool in_order) const {
+    ScaledFleet drawn = flat_;
     for (std::size_t u = 0; u < drawn.robots.size(); ++u) {
       RobotRuns& to = drawn.robots[u];
       const RobotRuns& from = flat_.robots[u];
@@ -182,20 +125,22 @@ class NullRuns {
   }
 
  private:
-  const Scaled& fleet_;
-  Scaled flat_;  // without what each robot owns
+  const ScaledFleet& fleet_;
+  ScaledFleet flat_;  // without what each robot owns
   std::vector<std::vector<MatrixXd>> roots_;
   VectorXd between_;
 };
 
-WatchThresholds draw_thresholds(const Scaled& fleet, const RunVariances& variances,
-                                const NullRuns& null, std::uint64_t seed, bool in_order) {
+// `fleet`: with steps that are no scatter.
+WatchThresholds draw_thresholds(const ScaledFleet& fleet, const RunVariances& variances,
+                                std::uint64_t seed, bool in_order) {
+  const NullRuns null(fleet, variances);
   std::vector<std::vector<double>> steps(fleet.directions.size());
   std::vector<double> robots;
   const bool compared = fleet.robots.size() > 2;
   for (int d = 0; d < kNullDraws; ++d) {
     Stream stream({seed, Purpose::kStatistics, in_order ? 5U : 6U, static_cast<std::uint64_t>(d)});
-    Scaled drawn = null.draw(&stream, in_order);
+    ScaledFleet drawn = null.draw(&stream, in_order);
     RunVariances at = variances;
     estimate_variances(&drawn.robots, &at, kWarmRounds);
     if (compared) {
@@ -203,7 +148,7 @@ WatchThresholds draw_thresholds(const Scaled& fleet, const RunVariances& varianc
       null.differ(&stream, &fits);
       robots.push_back(farthest_robot(drawn, fits).statistic);
     }
-    for (const Candidate& step : best_steps_themselves(&drawn, kWarmRounds, &at)) {
+    for (const StepCandidate& step : best_steps(&drawn, kWarmRounds, &at)) {
       steps[step.value].push_back(step.statistic);
     }
   }
@@ -216,6 +161,22 @@ WatchThresholds draw_thresholds(const Scaled& fleet, const RunVariances& varianc
     thresholds.steps.push_back(threshold_of(of_value, each / static_cast<double>(steps.size())));
   }
   return thresholds;
+}
+
+// The higher ones of normal runs and of these in another order.  A step that is left in these
+// would pass for their scatter and hide the others: all that normal runs do not show are taken out.
+WatchThresholds thresholds_of(ScaledFleet fleet, RunVariances variances, std::uint64_t seed) {
+  ScaledFleet stepped = fleet;
+  const StepCandidate best = best_of(best_steps(&stepped, kEstimateRounds, &variances));
+  if (best.statistic > 0) add_step(best, &stepped);
+  WatchThresholds most = draw_thresholds(stepped, variances, seed, true);
+  if (!add_steps_beyond(most.steps, &fleet, &variances).empty()) stepped = std::move(fleet);
+  const WatchThresholds again = draw_thresholds(stepped, variances, seed, false);
+  for (std::size_t k = 0; k < most.steps.size(); ++k) {
+    most.steps[k] = std::max(most.steps[k], again.steps[k]);
+  }
+  most.robot = std::max(most.robot, again.robot);
+  return most;
 }
 
 // The smallest span of runs that holds these shares' 90 % best.
@@ -236,8 +197,8 @@ std::pair<std::size_t, std::size_t> span_of(const std::vector<double>& shares) {
 
 // A step by its posterior over values and onsets, all equally likely before and its size normal
 // round nothing; the robot's other steps are in the fit.
-ValueStep describe_step(const WatchedRows& rows, const Scaled& fleet, const RunVariances& variances,
-                        const Candidate& found) {
+ValueStep describe_step(const WatchedRows& rows, const ScaledFleet& fleet,
+                        const RunVariances& variances, const StepCandidate& found) {
   const RobotRuns& robot = fleet.robots[found.robot];
   const auto scores = score_steps(fit_robot(robot, variances), robot, fleet.directions);
   std::vector<std::vector<double>> weights(scores.size());
@@ -278,12 +239,12 @@ ValueStep describe_step(const WatchedRows& rows, const Scaled& fleet, const RunV
 }
 
 // Steps as all that was found describes them, each beside the others.
-std::vector<ValueStep> describe_steps(const WatchedRows& rows, const Scaled& fleet,
+std::vector<ValueStep> describe_steps(const WatchedRows& rows, const ScaledFleet& fleet,
                                       const RunVariances& variances,
-                                      const std::vector<Candidate>& found) {
+                                      const std::vector<StepCandidate>& found) {
   std::vector<ValueStep> steps;
   for (std::size_t s = 0; s < found.size(); ++s) {
-    Scaled without = fleet;
+    ScaledFleet without = fleet;
     for (RobotRuns& robot : without.robots) robot.steps.clear();
     for (std::size_t t = 0; t < found.size(); ++t) {
       if (t != s) add_step(found[t], &without);
@@ -296,10 +257,11 @@ std::vector<ValueStep> describe_steps(const WatchedRows& rows, const Scaled& fle
   return steps;
 }
 
-std::vector<std::vector<RunReading>> readings_of(const WatchedRows& rows, const Scaled& fleet,
+std::vector<std::vector<RunReading>> readings_of(const WatchedRows& rows, const ScaledFleet& fleet,
                                                  const RobotFit& fit, const VectorXd& owned) {
   std::vector<std::vector<RunReading>> readings;
   const Index p = owned.size(), q = fit.beta.size();
+  const VectorXd away = owned - vector_of(rows.rows, &KinematicRow::nominal);
   for (std::size_t k = 0; k < fleet.directions.size(); ++k) {
     const VectorXd& d = fleet.directions[k];
     const VectorXd& among = rows.values[k].direction;
@@ -308,15 +270,15 @@ std::vector<std::vector<RunReading>> readings_of(const WatchedRows& rows, const 
       const double precision = d.dot(fit.precisions[i] * d);
       const VectorXd off =
           fit.residuals[i] + fit.designs[i].rightCols(q - p) * fit.beta.tail(q - p);
-      of_value.push_back(
-          {among.dot(owned) / among.sum() + d.dot(fit.precisions[i] * off) / precision,
-           1 / std::sqrt(precision)});
+      of_value.push_back({rows.values[k].nominal + among.dot(away) / among.squaredNorm() +
+                              d.dot(fit.precisions[i] * off) / precision,
+                          1 / std::sqrt(precision)});
     }
   }
   return readings;
 }
 
-std::vector<std::vector<double>> detectable_of(const Scaled& fleet, RobotRuns robot,
+std::vector<std::vector<double>> detectable_of(const ScaledFleet& fleet, RobotRuns robot,
                                                const RunVariances& variances,
                                                const WatchThresholds& thresholds) {
   robot.steps.clear();
@@ -334,29 +296,15 @@ std::vector<std::vector<double>> detectable_of(const Scaled& fleet, RobotRuns ro
 
 FleetChanges find_changes(const WatchedRows& rows,
                           const std::vector<std::vector<OffsetFit>>& robots, std::uint64_t seed) {
-  Scaled fleet = scaled(rows, robots);
+  ScaledFleet fleet = scaled(rows, robots);
   const Index p = fleet.owned.size();
   RunVariances variances{1, VectorXd::Ones(p)};
-  estimate_variances(&fleet.robots, &variances, kRounds);
+  estimate_variances(&fleet.robots, &variances, kEstimateRounds);
   FleetChanges result;
-  std::vector<Candidate> best = best_steps_themselves(&fleet, kRounds, &variances);
-  const NullRuns null(fleet, variances, best_of(best));
-  WatchThresholds& most = result.thresholds;
-  most = draw_thresholds(fleet, variances, null, seed, true);
-  const WatchThresholds again = draw_thresholds(fleet, variances, null, seed, false);
-  for (std::size_t k = 0; k < most.steps.size(); ++k) {
-    most.steps[k] = std::max(most.steps[k], again.steps[k]);
-  }
-  most.robot = std::max(most.robot, again.robot);
-  std::vector<Candidate> found;
-  while (found.size() < kMostSteps) {
-    const Candidate step = best_of(best, most.steps);
-    if (step.statistic <= most.steps[step.value]) break;
-    add_step(step, &fleet);
-    found.push_back(step);
-    best = best_steps_themselves(&fleet, kRounds, &variances);
-  }
-  estimate_variances(&fleet.robots, &variances, kRounds);
+  result.thresholds = thresholds_of(fleet, variances, seed);
+  const WatchThresholds& most = result.thresholds;
+  const auto found = add_steps_beyond(most.steps, &fleet, &variances);
+  estimate_variances(&fleet.robots, &variances, kEstimateRounds);
   result.steps = describe_steps(rows, fleet, variances, found);
   std::vector<RobotFit> fits = fit_robots(fleet, variances);
   const Shared shared = estimate_shared(fits, fleet.owned, -1);

@@ -90,17 +90,22 @@ void estimate_variances(std::vector<RobotRuns>* robots, RunVariances* at, int ro
 }
 
 std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const RobotRuns& robot,
-                                                const std::vector<VectorXd>& directions) {
+                                                const std::vector<VectorXd>& directions,
+                                                std::size_t length) {
   const std::size_t n = robot.values.size();
   std::vector<std::vector<StepScore>> scores(directions.size(), std::vector<StepScore>(n));
   const Index p = n == 0 ? 0 : fit.precisions[0].rows();
   MatrixXd weight = MatrixXd::Zero(p, p), shared = MatrixXd::Zero(fit.beta.size(), p);
   VectorXd pull = VectorXd::Zero(p);
+  const auto count = [&](std::size_t run, double sign) {
+    weight += sign * fit.precisions[run];
+    shared += sign * fit.designs[run].transpose() * fit.precisions[run];
+    pull += sign * fit.precisions[run] * fit.residuals[run];
+  };
   for (std::size_t i = n; i-- > 0;) {
-    weight += fit.precisions[i];
-    shared += fit.designs[i].transpose() * fit.precisions[i];
-    pull += fit.precisions[i] * fit.residuals[i];
-    if (n - i < kLeastRuns || i < kLeastRuns) continue;
+    count(i, 1);
+    if (length > 0 && i + length < n) count(i + length, -1);
+    if (n - i < kLeastRuns + length || i < kLeastRuns) continue;
     for (std::size_t k = 0; k < directions.size(); ++k) {
       const VectorXd& d = directions[k];
       const VectorXd taken = shared * d;

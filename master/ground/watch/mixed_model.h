@@ -40,7 +40,8 @@ RobotFit fit_robot(const RobotRuns& robot, const RunVariances& variances);
 void estimate_variances(std::vector<RobotRuns>* robots, RunVariances* at, int rounds);
 inline constexpr double kRunTail = 6;
 
-// The step in this direction at this run that the fit would gain most of.
+// The step in this direction at this run that the fit would gain most of; back after `length` runs,
+// 0: never.
 struct StepScore {
   double change = 0;
   double precision = 0;  // of the change
@@ -48,7 +49,8 @@ struct StepScore {
 };
 // [direction][onset]; nothing (precision 0) where fewer than kLeastRuns runs lie on a side.
 std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const RobotRuns& robot,
-                                                const std::vector<Eigen::VectorXd>& directions);
+                                                const std::vector<Eigen::VectorXd>& directions,
+                                                std::size_t length = 0);
 
 // What robots share, and differ by: a random effect a row.
 struct Shared {

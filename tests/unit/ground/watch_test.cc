@@ -108,6 +108,32 @@ TEST(Watch, NamesTheRobotTheWheelAndTheRun) {
   }
 }
 
+// Each alone would be found; neither is scatter of the other's robot.
+TEST(Watch, NamesTheSameStepOfTwoRobots) {
+  const WatchedRows rows = rows_of_create();
+  Fleet fleet = make_fleet(rows, 11);
+  add(rows, "left", -0.03, 7, kRuns, &fleet[2]);
+  add(rows, "left", -0.03, 6, kRuns, &fleet[3]);
+  const FleetChanges changes = find_changes(rows, fleet, 1);
+  ASSERT_EQ(changes.steps.size(), 2u);
+  for (const std::size_t k : {0u, 1u}) {
+    EXPECT_EQ(changes.steps[k].robot, 2 + k);
+    EXPECT_EQ(rows.values[changes.steps[k].value].value, "left");
+  }
+}
+
+TEST(Watch, NamesWhatIsPutRightAgain) {
+  const WatchedRows rows = rows_of_create();
+  Fleet fleet = {make_fleet(rows, 15)[0]};
+  add(rows, "left", -0.03, 4, 8, &fleet[0]);
+  const FleetChanges changes = find_changes(rows, fleet, 1);
+  ASSERT_EQ(changes.steps.size(), 2u);
+  EXPECT_NEAR(static_cast<double>(changes.steps[0].onset), 4, 1);
+  EXPECT_NEAR(static_cast<double>(changes.steps[1].onset), 8, 1);
+  EXPECT_LT(changes.steps[0].hi, 0);
+  EXPECT_GT(changes.steps[1].lo, 0);
+}
+
 TEST(Watch, TakesNoSingleRunForAStep) {
   const WatchedRows rows = rows_of_create();
   Fleet fleet = make_fleet(rows, 12);
