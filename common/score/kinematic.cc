@@ -176,6 +176,7 @@ class Body {
     if (name == "ahead") ahead_ *= value;
     if (name == "aside") aside_ *= value;
     if (name == "turn") turn_ *= value;
+    if (name == "arm") turn_ /= value;
     if (name == "steering_gain") robot_.steering.gain *= value;
     if (name == "steering_left" || name == "steering_right") {
       const double sign = name == "steering_left" ? 1 : -1;

@@ -2,74 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "master/ground/catalogue.h"
 #include "master/ground/fit/scans.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/floor/regions.h"
 #include "master/ground/floor/tilt.h"
-#include "master/ground/put_right.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
-
-using std::numbers::pi;
-
-std::vector<std::pair<std::size_t, std::size_t>> channel_pairs(const GroundRobot& robot) {
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  for (std::size_t i = 0; i < robot.channels.size(); ++i) {
-    std::string other = robot.channels[i];
-    const auto at = other.find("left");
-    if (at == std::string::npos) continue;
-    other.replace(at, 4, "right");
-    for (std::size_t j = 0; j < robot.channels.size(); ++j) {
-      if (robot.channels[j] == other) pairs.emplace_back(i, j);
-    }
-  }
-  return pairs;
-}
-
-class Catalogue {
- public:
-  Catalogue(const GroundRobot& robot, std::vector<KinematicRow> rows)
-      : robot_(robot), rows_(std::move(rows)) {}
-
-  void wrong_commands();
-  void wrong_poses();
-  void sizes();
-  void steering();
-  void motors();
-  void marker();
-  void tracker();
-  void floors();
-  void world();
-
-  std::vector<GroundHypothesis> all;
-
- private:
-  KinematicRow row(const std::string& name) const {
-    return *std::ranges::find(rows_, name, &KinematicRow::name);
-  }
-  GroundHypothesis& value(const std::string& name, std::vector<std::string> aliases,
-                          const std::string& thing, std::vector<KinematicRow> freed) {
-    const double more_values = static_cast<double>(freed.size()) - 1;
-    all.push_back({name, std::move(aliases), thing, std::move(freed)});
-    all.back().price = kPriceOfAValue * more_values;
-    return all.back();
-  }
-  GroundHypothesis& fault(const std::string& name, std::vector<std::string> aliases,
-                          const std::string& thing, const std::string& remedy,
-                          std::function<void(RunLog*)> put_right) {
-    all.push_back({name, std::move(aliases), thing, {}, std::move(put_right), 1, remedy});
-    return all.back();
-  }
-
-  const GroundRobot& robot_;
-  std::vector<KinematicRow> rows_;
-};
 
 // Of what does not depend on the fit that it is offered beside.
 auto from_scan(Eigen::VectorXd (*scan)(const WindowFitter&, const std::vector<FitRow>&,
@@ -78,109 +22,7 @@ auto from_scan(Eigen::VectorXd (*scan)(const WindowFitter&, const std::vector<Fi
                 const Eigen::VectorXd& values) { return scan(fitter, rows, values); };
 }
 
-// `alias`: what else makes all motions larger than commanded.
-struct CommandUnit {
-  CommandKind of;
-  bool turns;
-  const char *thing, *name;
-  double factor;
-  const char* alias;
-};
-
-constexpr CommandKind kWheels = CommandKind::kWheelSpeeds, kTwists = CommandKind::kTwist;
-constexpr CommandUnit kCommandUnits[] = {
-    {kWheels, true, "wheel speeds", "rpm", 2 * pi / 60, "wheel_radius"},
-    {kWheels, true, "wheel speeds", "degrees a second", pi / 180, "wheel_radius"},
-    {kWheels, true, "wheel speeds", "turns a second", 2 * pi, "wheel_radius"},
-    {kTwists, false, "commanded speeds", "km/h", 1 / 3.6, "pose_scale"},
-    {kTwists, false, "commanded speeds", "mm/s", 1e-3, "pose_scale"},
-    {kTwists, true, "commanded turns", "degrees a second", pi / 180, "turn_gain"}};
-
-void Catalogue::wrong_commands() {
-  const auto pairs = channel_pairs(robot_);
-  if (!pairs.empty()) {
-    fault("sides_swapped", {}, "left and right of the commands",
-          "Swap the columns of the two sides.", change_commands([pairs](std::vector<double>& v) {
-            for (const auto& [l, r] : pairs) std::swap(v[l], v[r]);
-          }));
-    for (const bool left : {true, false}) {
-      fault("side_reversed", {"command_sign"},
-            std::string("the sign of the ") + (left ? "left" : "right") + " side",
-            "Turn the sign of that column.", change_commands([pairs, left](std::vector<double>& v) {
-              for (const auto& [l, r] : pairs) v[left ? l : r] *= -1;
-            }));
-    }
-  }
-  fault("command_reversed", {"command_sign"}, "the sign of every command",
-        "Turn the sign of the commands.", change_commands([](std::vector<double>& v) {
-          for (double& value : v) value = -value;
-        }));
-  for (std::size_t c = 0; c < robot_.channels.size(); ++c) {
-    const std::string& channel = robot_.channels[c];
-    if (channel != "steering" && channel != "omega" && channel != "vy" && channel != "v") continue;
-    const bool turns = channel == "steering" || channel == "omega";
-    fault(turns ? "steering_reversed" : "command_reversed", {"command_sign"},
-          "the sign of " + channel, "Turn the sign of that column.",
-          change_commands([c](std::vector<double>& v) { v[c] *= -1; }));
-  }
-  if (const auto& timeout_s = robot_.motors.command_timeout_s) {
-    fault("command_timeout", {"commands_on_change"},
-          "commands that hold until the next (their log keeps changes alone)",
-          "Give no cmd_vel_timeout with such a log.", hold_commands(*timeout_s));
-  }
-  for (const CommandUnit& unit : kCommandUnits) {
-    if (unit.of != robot_.command) continue;
-    const auto of_it = mapped(robot_.channels, [&](const std::string& channel) {
-      return unit.of != CommandKind::kTwist || unit.turns == (channel == "omega");
-    });
-    fault("unit_error", {"command_units", unit.alias},
-          std::string("the unit of the ") + unit.thing + ": " + unit.name,
-          std::string("Multiply them by ") + std::to_string(unit.factor) + ".",
-          change_commands([f = unit.factor, of_it](std::vector<double>& v) {
-            for (std::size_t c = 0; c < v.size(); ++c) v[c] *= of_it[c] ? f : 1;
-          }));
-  }
-}
-
-void Catalogue::wrong_poses() {
-  const auto diagonal = [](double x, double y, double theta) -> Eigen::Matrix3d {
-    return Eigen::Vector3d(x, y, theta).asDiagonal();
-  };
-  fault("heading_flipped", {"heading_sign"}, "the sign of the headings", "Turn the sign of theta.",
-        change_poses(diagonal(1, 1, -1)));
-  fault("heading_flipped", {"heading_offset"}, "headings that count clockwise from north (y)",
-        "Take theta from pi / 2.", change_poses(diagonal(1, 1, -1), -pi / 2))
-      .of_world = true;
-  fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
-        "Turn the sign of y, and that of theta when it follows the robot's turns the wrong way.",
-        change_poses(diagonal(1, -1, 1)));
-  Eigen::Matrix3d swapped = diagonal(0, 0, 1);
-  swapped(0, 1) = swapped(1, 0) = 1;
-  // Of increments the same as mirrored ones of a sensor that looks another way.
-  fault("axes_swapped", {"axes_mirrored"}, "x and y of the poses", "Swap the columns x and y.",
-        change_poses(swapped))
-      .of_world = true;
-  fault("heading_unit", {"unit_error"}, "headings in degrees", "Multiply theta by pi / 180.",
-        change_poses(diagonal(1, 1, pi / 180)))
-      .radians = pi / 180;
-  for (const double turn : {pi / 2, -pi / 2, pi}) {
-    fault("heading_turned", {"marker_yaw", "heading_offset"},
-          "headings that count from another axis, " + std::to_string(std::lround(turn * 180 / pi)) +
-              " degrees on",
-          "State the marker's yaw.", change_poses(diagonal(1, 1, 1), turn))
-        .of_world = true;
-  }
-  for (const auto& [unit, metres] : {std::pair{"millimetres", 0.001},
-                                     {"centimetres", 0.01},
-                                     {"decimetres", 0.1},
-                                     {"inches", 0.0254},
-                                     {"feet", 0.3048}}) {
-    fault("unit_error", {"pose_units", "pose_scale"}, std::string("positions in ") + unit,
-          "Multiply x and y by " + std::to_string(metres) + ".",
-          change_poses(diagonal(metres, metres, 1)))
-        .metres = metres;
-  }
-}
+}  // namespace
 
 void Catalogue::sizes() {
   const double share = skids(robot_) ? kSkidRadiusShare : kRadiusShare;
@@ -195,7 +37,8 @@ void Catalogue::sizes() {
     value("ahead_gain", {"roller_drag", "speed_gain"}, "travel ahead", {row("ahead")});
     value("aside_gain", {"roller_drag"}, "travel aside", {row("aside")});
     value("wheel_separation", {"robot_radius", "turn_gain"},
-          "how far the wheels stand from the middle", {row("turn")});
+          "how far the wheels stand from the middle",
+          {{"arm", 1, row("turn").tolerance, "ratio", "-"}});
     return;
   }
   if (is_steered(robot_)) {
@@ -313,8 +156,6 @@ void Catalogue::floors() {
     value("floor", {"wheel_slip", "wheel_radius"}, slips, {travel});
   }
 }
-
-}  // namespace
 
 std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
                                                 const std::vector<KinematicRow>& rows) {

@@ -53,6 +53,13 @@ inline constexpr double kSlipAngle_rad = 0.17;      // rear tyres where they hol
 inline constexpr double kKeptSlipAngle_rad = 0.02;  // how well that is known
 inline constexpr double kKeptGripShape = 0.05;      // of a logarithm; the reference sets it
 
+// What lies within as many tolerances may be chance: 95 and 99 % of what is normal.
+inline constexpr double kMovedTolerances = 2, kFarTolerances = 2.58;
+
+// A robot of less than this share of its file's sizes and gains is another robot, and one of none or
+// of the opposite sign none at all.
+inline constexpr double kLeastRatio = 0.1;
+
 // -- Plausible errors: standard deviations of a value that is wrong.  What lies far outside has to
 // -- explain that many more nats: a scale of y by half is 133 of them.  Sizes: a wrong wheel or
 // -- gear of the same series; times: what recorders lose; the tracker: what lenses and marks do.
@@ -68,6 +75,7 @@ inline constexpr PlausibleError kPlausibleErrors[] = {
     {"ahead", 0.2, "-"},
     {"aside", 0.2, "-"},
     {"turn", 0.3, "-"},
+    {"arm", 0.3, "-"},
     {"separation", 0.3, "-"},
     {"steering_gain", 0.3, "-"},
     {"steering_left", 0.3, "-"},

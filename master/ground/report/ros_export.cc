@@ -76,12 +76,12 @@ std::vector<ReportedValue> ros_values(const ReportedValues& reported) {
     arm = k.sum_of_robot_center_projection_m.value_or(arm);
     return {product(reported, "kinematics.wheels_radius", radius, {"travel", "ahead"}),
             product(reported, "kinematics.sum_of_robot_center_projection_on_X_Y_axis", arm,
-                    {"travel", "ahead"}, {"turn"})};
+                    {"travel", "ahead", "arm"}, {"turn"})};
   }
   if (robot.drive == DriveKind::kOmni) {
     return {product(reported, "wheel_radius", radius, {"travel", "ahead"}),
             product(reported, "robot_radius", k.robot_radius_m.value_or(wheel_reach_m(robot)),
-                    {"travel", "ahead"}, {"turn"})};
+                    {"travel", "ahead", "arm"}, {"turn"})};
   }
   if (is_steered(robot)) {
     std::vector<ReportedValue> rows = {product(reported, "wheelbase", k.wheelbase_m.value_or(0),

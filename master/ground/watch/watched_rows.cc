@@ -39,10 +39,14 @@ WatchedRows watched_rows(const GroundRobot& robot) {
     for (const KinematicRow& other : kept) {
       if (other.name == row.name) watched.owned[k] = other.tolerance;
     }
+    // Wheels that stand farther out turn the robot less far.
+    const bool inverse = row.name == "turn";
+    const std::string name = inverse ? "arm" : row.name;
     const auto h = std::ranges::find_if(catalogue, [&](const GroundHypothesis& of) {
-      return contains(of.freed, row.name, &KinematicRow::name);
+      return contains(of.freed, name, &KinematicRow::name);
     });
-    if (h != catalogue.end()) add(*h, row, Eigen::VectorXd::Unit(p, k));
+    if (h == catalogue.end()) continue;
+    add(*h, inverse ? h->freed.front() : row, (inverse ? -1 : 1) * Eigen::VectorXd::Unit(p, k));
   }
   // All wheels alike.
   Eigen::VectorXd travel = Eigen::VectorXd::Zero(p);

@@ -95,6 +95,7 @@ TEST(DiagnoseGround, FindsOneOfManyThings) {
       {kDifferential, "sag", 0.05, "battery_sag", "rate", 0.05},
       {kDifferential, "drift", 0.002, "clock_drift", "rate", 0.002},
       {kDifferential, "pose_scale", 1.05, "pose_scale", "ratio", 0.05},
+      {kOmni, "turn", 1 / 1.06, "wheel_separation", "ratio", 0.06},
       {kCar, "steering_offset", 0.03, "steering_offset", "angle", 0.03},
       {kCar, "steering_gain", 1.15, "steering_gain", "ratio", 0.15},
   };
@@ -176,6 +177,12 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
          X.y *= 1000;
        })},
       {"heading_unit", poses([](Pose& X) { X.theta *= 180 / std::numbers::pi; })},
+      {"heading_unit", poses([](Pose& X) { X.theta /= 2; })},  // asin() of a quaternion's z
+      {"unit_error", with([](LoggedRun& run) {                 // m/s of the rims
+         for (CommandRow& row : run.commands) {
+           for (double& speed : row.values) speed *= 0.05;
+         }
+       })},
   };
   for (const auto& [name, log] : cases) {
     const auto findings = check_ground_log(robot, log);
@@ -186,6 +193,25 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
     ASSERT_EQ(found.diagnosis.effects.size(), 1u) << name << ": " << found.diagnosis.headline;
     EXPECT_EQ(found.diagnosis.effects.front().name, name);
     EXPECT_EQ(found.diagnosis.action, findings.front().remedy);
+  }
+}
+
+TEST(DiagnoseGround, FindsColumnsOfWheelsThatAreAnothersOrReversed) {
+  const GroundRobot robot = robot_of(kOmni);
+  for (const char* fault : {"wheels_swapped", "side_reversed"}) {
+    RunLog log = driven(robot, {});
+    for (LoggedRun& run : log.runs) {
+      for (CommandRow& row : run.commands) {
+        if (fault == std::string("side_reversed")) {
+          row.values[1] *= -1;
+        } else {
+          std::swap(row.values[0], row.values[1]);
+        }
+      }
+    }
+    const Diagnosis found = diagnosis_of(robot, log).diagnosis;
+    ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+    EXPECT_EQ(found.effects.front().name, fault) << found.headline;
   }
 }
 

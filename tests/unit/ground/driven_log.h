@@ -42,6 +42,31 @@ coulomb = 0.0
 cornering = 0.0
 )";
 
+inline constexpr const char* kOmni = R"(drive = "omni"
+commands = ["w1", "w2", "w3"]
+robot_radius = 0.2
+wheel_radius = 0.05
+lag = 0.1
+[wheels.w1]
+kind = "omni"
+radius = 0.05
+x = 0.1
+y = -0.1732
+heading = -2.61799
+[wheels.w2]
+kind = "omni"
+radius = 0.05
+x = 0.1
+y = 0.1732
+heading = -0.5236
+[wheels.w3]
+kind = "omni"
+radius = 0.05
+x = -0.2
+y = 0
+heading = 1.5708
+)";
+
 inline GroundRobot robot_of(const char* text) {
   auto robot = parse_robot(text, "robot.toml");
   EXPECT_TRUE(robot.ok()) << robot.error().message;
@@ -54,7 +79,9 @@ inline CommandRow row_at(const GroundRobot& robot, int run, int second, double p
   if (robot.command == CommandKind::kThrottleSteering) {
     return {t, {push * (0.3 + 0.1 * std::sin(0.8 * t + run)), 0.8 * std::sin(1.9 * t + 2 * run)}};
   }
-  return {t, {5 + 4 * std::sin(1.7 * t + run), 5 + 4 * std::cos(2.3 * t + run)}};
+  const double a = 4 * std::sin(1.7 * t + run), b = 4 * std::cos(2.3 * t + run);
+  if (robot.channels.size() == 3) return {t, {a, b, 3 * std::sin(0.9 * t + 2 * run)}};
+  return {t, {5 + a, 5 + b}};
 }
 
 // What a robot that is `truly` off its file logs: five runs on one clock, poses of 0.3 mm and

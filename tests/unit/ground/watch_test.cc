@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -9,6 +10,7 @@
 #include "common/robot/robot_file.h"
 #include "master/ground/fit/fit_file.h"
 #include "master/ground/watch/changes.h"
+#include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm::watch_test {
 namespace {
@@ -132,6 +134,15 @@ TEST(Watch, NamesWhatIsPutRightAgain) {
   EXPECT_NEAR(static_cast<double>(changes.steps[1].onset), 8, 1);
   EXPECT_LT(changes.steps[0].hi, 0);
   EXPECT_GT(changes.steps[1].lo, 0);
+}
+
+// Wheels that stand farther out turn the robot less far.
+TEST(Watch, CountsHowFarWheelsStandFromTheMiddleAsASize) {
+  const WatchedRows rows = watched_rows(robot_of(kOmni));
+  const auto turn = std::ranges::find(rows.rows, "turn", &KinematicRow::name) - rows.rows.begin();
+  const WatchedValue& arm = rows.values[value_named(rows, "arm")];
+  EXPECT_EQ(arm.effect, "wheel_separation");
+  EXPECT_EQ(arm.direction[turn], -1);
 }
 
 TEST(Watch, TakesNoSingleRunForAStep) {

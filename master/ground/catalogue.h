@@ -1,0 +1,54 @@
+// What ground_hypotheses() and change_hypotheses() are put together from.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "master/ground/hypotheses.h"
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+
+class Catalogue {
+ public:
+  Catalogue(const GroundRobot& robot, std::vector<KinematicRow> rows)
+      : robot_(robot), rows_(std::move(rows)) {}
+
+  void wrong_commands();
+  void wrong_poses();
+  void sizes();
+  void steering();
+  void motors();
+  void marker();
+  void tracker();
+  void floors();
+  void world();
+
+  std::vector<GroundHypothesis> all;
+
+ private:
+  KinematicRow row(const std::string& name) const {
+    return *std::ranges::find(rows_, name, &KinematicRow::name);
+  }
+  GroundHypothesis& value(const std::string& name, std::vector<std::string> aliases,
+                          const std::string& thing, std::vector<KinematicRow> freed) {
+    const double more_values = static_cast<double>(freed.size()) - 1;
+    all.push_back({name, std::move(aliases), thing, std::move(freed)});
+    all.back().price = kPriceOfAValue * more_values;
+    return all.back();
+  }
+  GroundHypothesis& fault(const std::string& name, std::vector<std::string> aliases,
+                          const std::string& thing, const std::string& remedy,
+                          std::function<void(RunLog*)> put_right) {
+    all.push_back({name, std::move(aliases), thing, {}, std::move(put_right), 1, remedy});
+    return all.back();
+  }
+
+  const GroundRobot& robot_;
+  std::vector<KinematicRow> rows_;
+};
+
+}  // namespace gapfarm
