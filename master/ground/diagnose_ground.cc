@@ -9,6 +9,7 @@
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/progress/stage_clock.h"
+#include "common/robot/robot_file.h"
 #include "master/ground/reference.h"
 #include "master/ground/report/ground_report.h"
 #include "master/ground/tolerances.h"
@@ -82,6 +83,10 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
   clock.begin(std::end(kGroundStages)[-1].name);
   GroundDiagnosis result = report_ground(robot, search, options);
   result.corrected = robot_with(file, chosen_values(search, result.values));
+  if (search.faults.empty() && !search.reference && !search.windows.simulated &&
+      !result.diagnosis.effects.empty() && format_robot(result.corrected) == format_robot(file)) {
+    result.diagnosis.action = "The robot's file has no word for that, and stays as it is.";
+  }
   clock.begin("");
   result.diagnosis.timing_s = std::move(clock.timing_s);
   return result;

@@ -26,6 +26,9 @@ struct KinematicRow {
   double farthest = 0;    // how far off nominal it may be where it is asked for; 0: anywhere
 };
 
+// Below it the value has no meaning; -infinity: anywhere.
+double least_value(const KinematicRow& row);
+
 struct NamedEffect;
 class WindowFitter;
 struct FitRow;

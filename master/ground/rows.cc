@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "master/ground/hypotheses.h"
@@ -11,6 +12,11 @@ namespace {
 double reach_of(const GroundRobot& robot) { return std::max(wheel_reach_m(robot), 1e-3); }
 
 }  // namespace
+
+double least_value(const KinematicRow& row) {
+  if (row.positive) return 0;
+  return row.key == "ratio" ? kLeastRatio * row.nominal : -std::numeric_limits<double>::infinity();
+}
 
 double plausible_error(const KinematicRow& row) {
   for (const PlausibleError& error : kPlausibleErrors) {

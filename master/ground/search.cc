@@ -6,6 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/math/algebra.h"
 #include "common/math/statistics.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/report/ground_text.h"
@@ -269,6 +270,18 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
 
 namespace {
 
+// Whether a value that has no name moved by more than a robot changes from log to log, and than the
+// reference leaves open.
+bool moved_far(const WindowFitter& fitter, const WindowFit& fit) {
+  const Eigen::MatrixXd covariance = inverse_of_symmetric(fitter.prior_precision(fit.rows));
+  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const double moved = std::abs(fit.values[i] - fit.rows[k].row.nominal);
+    if (!fit.rows[k].free && moved > kFarTolerances * std::sqrt(covariance(i, i))) return true;
+  }
+  return false;
+}
+
 // What everything that was tried would still close.
 void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
   std::vector<FitRow> all = search->fit.rows;
@@ -276,7 +289,7 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
   search->free_fit = fitter.fit(all, {}, search->fit.values);
   WindowFit moved = fit_held_out(fitter, search->fit.rows, search->fit.values);
   const WindowFit named = search->chain.back();
-  const WindowFit& before = search->reference ? moved : named;
+  const WindowFit& before = search->reference && !moved_far(fitter, search->fit) ? moved : named;
   WindowFit best = before;
   std::swap(best, search->best);
   std::string what = "what is named";

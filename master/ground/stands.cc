@@ -1,7 +1,10 @@
 #include "master/ground/stands.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "common/base/ranges.h"
+#include "master/ground/fit/held_out.h"
 #include "master/ground/report/ground_text.h"
 
 namespace gapfarm {
@@ -20,12 +23,22 @@ void take_values(const WindowFit& fit, const std::vector<FitRow>& rows, Eigen::V
 bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
                     std::size_t index, const WindowFit& fit) {
   const GroundHypothesis& hypothesis = search.catalogue[index];
-  if (!hypothesis.describe) return true;
-  NamedEffect effect;
-  hypothesis.describe(fitter, fit, work.seed, &effect);
-  const Estimate& size = effect.parameters.front();
   const double kept = search.reference ? hypothesis.kept : 0;
-  return size.lo > kept || size.hi < -kept;
+  const auto shows = [&](const Estimate& size) { return size.lo > kept || size.hi < -kept; };
+  if (hypothesis.describe) {
+    NamedEffect effect;
+    hypothesis.describe(fitter, fit, work.seed, &effect);
+    return shows(effect.parameters.front());
+  }
+  return std::ranges::any_of(
+      derived_estimates(fitter, fit, work.seed,
+                        [&](const Eigen::VectorXd& values) {
+                          return mapped(hypothesis.freed, [&](const KinematicRow& row) {
+                            const double value = values[row_index(fit.rows, row.name)];
+                            return Estimate{row.key, value - row.nominal, 0, 0, row.unit};
+                          });
+                        }),
+      shows);
 }
 
 WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,

@@ -303,11 +303,12 @@ double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::Matr
 
 namespace {
 
-// Values after a step of Gauss and Newton; what would fall below where it has a meaning stays at 0.
+// Values after a step of Gauss and Newton; what would fall below where it has a meaning stays
+// there.
 Eigen::VectorXd stepped(const WindowFit& fit, const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
-  Eigen::VectorXd least = Eigen::VectorXd::Constant(g.size(), -INFINITY);
+  Eigen::VectorXd least(g.size());
   for (Eigen::Index k = 0; k < g.size(); ++k) {
-    if (fit.rows[static_cast<std::size_t>(k)].row.positive) least[k] = -fit.values[k];
+    least[k] = least_value(fit.rows[static_cast<std::size_t>(k)].row) - fit.values[k];
   }
   return fit.values + bounded_minimum(H, -g, least, Eigen::VectorXd::Constant(g.size(), INFINITY));
 }

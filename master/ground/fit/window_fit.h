@@ -143,6 +143,10 @@ class WindowFitter {
   // best: a battery, what rollers picked up.
   WindowFit within_runs(WindowFit fit) const;
 
+  // Of the prior of these rows, whose middle are their nominals; what the reference leaves open is in
+  // it.
+  Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
+
   // A fit's residuals as they are: m, m, rad.
   std::vector<Eigen::Vector3d> raw_residuals(const WindowFit& fit) const;
   // Of poses; gyros and returns are omitted.
@@ -166,8 +170,6 @@ class WindowFitter {
   bool step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J, const std::vector<double>& use,
             double* damping) const;
   std::vector<double> uses(const std::vector<char>& held_out) const;
-  // Of the prior of these rows, whose middle are their nominals.
-  Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
   double prior(const WindowFit& fit) const;
   // Of a row in the reference; -1: it is not there.
   Eigen::Index in_reference(const FitRow& row) const;

@@ -224,9 +224,7 @@ OffsetFit WindowFitter::fit_with_offsets(WindowFit fit) {
     }
     fit.values += step.head(n);
     for (Eigen::Index k = 0; k < n; ++k) {
-      if (fit.rows[k].row.positive) {
-        fit.values[k] = std::max(fit.values[k], 0.0);
-      }
+      fit.values[k] = std::max(fit.values[k], least_value(fit.rows[k].row));
     }
     offsets += step.tail(m);
     fit.residuals = residuals(fit.rows, fit.values);

@@ -209,9 +209,16 @@ void GroundReport::judge() {
   d_.findings.push_back(verdict_reason(figures_));
   unseen_ = values_not_shown(fitter_, search_, options_.seed);
   if (!unseen_.empty()) d_.cautions.push_back(unseen_);
-  if (nothing_is_left(figures_)) return;
-  d_.where = where_left(fitter_, search_, options_.windows.horizons_s);
   const std::string moved = values_that_would_move(search_);
+  if (nothing_is_left(figures_)) {
+    if (search_.reference && d_.gap.final_ > kToleratedGap) {
+      d_.findings.push_back(
+          "What gap there is closes where values move as they do from log to log" +
+          (moved.empty() ? "." : ": " + moved + "."));
+    }
+    return;
+  }
+  d_.where = where_left(fitter_, search_, options_.windows.horizons_s);
   if (!moved.empty()) {
     d_.findings.push_back("Were all values free, these would move most: " + moved + ".");
   }
@@ -351,6 +358,9 @@ Diagnosis GroundReport::write() {
   figures_.faults += static_cast<int>(d_.effects.size() - values_named);
   figures();
   judge();
+  if (const std::string sure = further_values(search_, reported_values()); !sure.empty()) {
+    d_.cautions.push_back(sure);
+  }
   clocks();
   screening();
   trials();

@@ -93,7 +93,6 @@ std::string change_text(const GroundRobot& robot, const KinematicRow& row, const
 
 constexpr double kLeastShareOfGap = 0.25;
 constexpr double kSensorSure = 0.99;  // outside its interval by far
-constexpr double kMovedTolerances = 2;
 constexpr std::size_t kMostMoved = 4;
 
 struct ComponentGap {
@@ -342,6 +341,21 @@ std::string values_that_would_move(const GroundSearch& search) {
   std::sort(moved.begin(), moved.end());
   moved.resize(std::min(moved.size(), kMostMoved));
   return joined(moved, ", ", [](const auto& value) { return value.second; });
+}
+
+std::string further_values(const GroundSearch& search, const std::vector<ReportedValue>& values) {
+  if (search.reference || search.windows.simulated) return "";
+  std::vector<std::string> sure;
+  for (std::size_t j = 0; j < values.size(); ++j) {
+    const ReportedValue& v = values[j];
+    const bool sensed = std::ranges::any_of(
+        search.sensor, [&](const SensorValue& of) { return of.row.name == v.name; });
+    if (!v.named || search.fit.rows[j].free || sensed) continue;
+    sure.push_back(fmt::format("{} {:.4g} [{:.4g}, {:.4g}] in place of {:.4g}", v.name, v.reported,
+                               v.interval.lower, v.interval.upper, v.had));
+  }
+  return sure.empty() ? ""
+                      : "robot.toml has what else these runs are sure of: " + joined(sure) + ".";
 }
 
 std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {

@@ -6,6 +6,7 @@
 
 #include "master/diagnose/result/diagnosis.h"
 #include "master/ground/fit/held_out.h"
+#include "master/ground/report/ros_export.h"
 #include "master/ground/search.h"
 
 namespace gapfarm {
@@ -81,6 +82,9 @@ std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& sea
 // Values that would move most, each more than two of its tolerances, were all of them free; empty:
 // none.  "separation by -3.1 %, lag by +0.05 s".
 std::string values_that_would_move(const GroundSearch& search);
+
+// What robot.toml has beside what is named; empty: nothing.
+std::string further_values(const GroundSearch& search, const std::vector<ReportedValue>& values);
 
 // The one thing to do about it, by the verdict and the effects of `diagnosis`; a sentence.
 std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis);

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "master/ground/diagnose_ground.h"
+#include "master/ground/tolerances.h"
 #include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {
@@ -98,7 +99,7 @@ TEST(WhatChanged, ReportsNothingWhereOnlyTheSpeedIsAnother) {
   const Kinematics own = off_by({"understeer", "grip", "slip_angle"}, {0.1, std::log(60.0), 0.17});
   const GroundDiagnosis same = changed(car, driven(car, own, 0, 0.7), driven(car, own, 5, 1.4));
   EXPECT_TRUE(same.diagnosis.effects.empty()) << same.diagnosis.headline;
-  EXPECT_EQ(same.diagnosis.verdict, Verdict::kNone);
+  EXPECT_EQ(same.diagnosis.verdict, Verdict::kNone) << same.diagnosis.findings.back();
 }
 
 // What no row of the file says and both logs show is the robot's own.
@@ -133,6 +134,16 @@ TEST(WhatChanged, ReportsNothingOfWhatMovesNoEnd) {
   const RunLog noisy = shaken(driven(skid, with_lag(0.1)), 0.03);
   const GroundDiagnosis same = changed(skid, noisy, shaken(driven(skid, with_lag(0.16), 5), 0.03));
   EXPECT_TRUE(same.diagnosis.effects.empty()) << same.diagnosis.headline;
+}
+
+// A value that moves by more than it does from log to log is no nothing, named or not.
+TEST(WhatChanged, ReportsNotNothingWhereAFarMoveClosesTheGap) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const auto with_lag = [](double lag_s) { return off_by({"lag"}, {lag_s}); };
+  const Diagnosis found =
+      changed(robot, driven(robot, with_lag(0.1)), driven(robot, with_lag(0.2), 5)).diagnosis;
+  EXPECT_GT(found.gap.tuned, kToleratedGap);
+  EXPECT_NE(found.verdict, Verdict::kNone) << found.headline;
 }
 
 TEST(WhatChanged, GivesASkidSteersMultiplierBeforeAndAfter) {
