@@ -276,6 +276,7 @@ Result<std::optional<Problem>> held_out_of(const RunInfo& info, const Problem& p
                      parse_config(info.config_text, info.config_path, start_no_program));
     config.windows = read.windows;
     config.trial_files = read.trial_files;
+    take_stored_files(info, &config);
   }
   ASSIGN_OR_RETURN(const auto plan, read_stages(config));
   return read_validation(plan, config);

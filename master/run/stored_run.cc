@@ -30,6 +30,8 @@ void each(Visit visit) {
 // Among the overrides: the kind that a config without one got.  Runs from before there was `auto`
 // by default have none, and are the genetic algorithm's.
 constexpr const char* kDefaultKind = "optimiser";
+// And the log's files, which the config may not name.
+constexpr const char* kTrialFiles = "trials";
 
 Json start_json(const SearchStart& start) {
   Json json = {{"from", start.from}, {"genomes", start.genomes}};
@@ -76,6 +78,7 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
     changes[kDefaultKind] =
         optimisers()[static_cast<std::size_t>(config.evolution.optimiser.kind)].name;
   }
+  if (!config.trial_files.empty()) changes[kTrialFiles] = config.trial_files;
   const SearchStart& start = config.evolution.start;
   if (!start.genomes.empty()) changes["start"] = start_json(start);
   info.overrides = json_text(changes);
@@ -104,11 +107,21 @@ Result<Problem> stored_problem(const RunReader& run) {
   return error;
 }
 
+void take_stored_files(const RunInfo& info, Config* config) {
+  const Json json = parse_json(info.overrides);
+  if (!json.is_object() || !json.value(kTrialFiles, Json()).is_array()) return;
+  config->trial_files.clear();
+  for (const Json& file : json[kTrialFiles]) {
+    if (file.is_string()) config->trial_files.push_back(file.get<std::string>());
+  }
+}
+
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
   Result<Config> config = parse_config(info.config_text, info.config_path, start_program);
   if (!config) return config.error();
   ASSIGN_OR_RETURN(Problem problem, stored_problem(info));
   config->problem = std::move(problem);
+  take_stored_files(info, &*config);
   config->seed = info.seed;
   if (default_optimiser(info.config_text) && !parse_json(info.overrides).contains(kDefaultKind)) {
     config->evolution.optimiser.kind = OptimiserKind::kGenetic;
@@ -136,8 +149,8 @@ Result<Model> model_of_member(const RunReader& run, const StoredIndividual& memb
   Model model = model_of_problem(problem, problem.values_of(member.genome));
   model.score = member.fitness;
   model.data = {run.info().problem_hash, problem.log.trials.size(), {}};
-  if (const auto config =
-          parse_config(run.info().config_text, run.info().config_path, start_program)) {
+  if (auto config = parse_config(run.info().config_text, run.info().config_path, start_program)) {
+    take_stored_files(run.info(), &*config);
     model.data.files = config->trial_files;
   }
   model.origin = {name, run.info().seed, generation, evaluations};

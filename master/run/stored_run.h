@@ -33,6 +33,9 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides);
 Result<Problem> stored_problem(const RunInfo& info);
 Result<Problem> stored_problem(const RunReader& run);  // the error names the run
 
+// The files that the run's log was read from; those of the config where the store has none.
+void take_stored_files(const RunInfo& info, Config* config);
+
 // The run's config and problem, with its overrides and then these.
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides);
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/config/model.h"
 #include "master/run/stored_run.h"
 #include "tests/integration/demo_config.h"
 #include "tests/unit/blind/worker_farm.h"
@@ -136,6 +137,19 @@ TEST_F(RunTest, LeavesItsModelAndPicturesBehind) {
   for (const std::string& file : summary.files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
   EXPECT_EQ(progress().state, RunState::kFinished);
   EXPECT_THAT(listener_.errors, IsEmpty());
+}
+
+TEST_F(RunTest, ItsModelNamesTheLogsFilesAlsoAfterItWasResumed) {
+  Config asked = config();
+  asked.trial_files = {"monday.csv", "tuesday.csv"};  // not the config's: as by --trials
+  RunStore store = begin(asked);
+  ASSERT_TRUE(go(store, asked).ok());
+  const auto files = [&] { return read_model(path() + "/model.toml").value().data.files; };
+  EXPECT_EQ(files(), asked.trial_files);
+  { const RunStore closed = std::move(store); }
+  ASSERT_TRUE(go_on().ok());
+  EXPECT_EQ(files(), asked.trial_files);
+  EXPECT_EQ(current_best(RunReader::open(path()).value()).value().data.files, asked.trial_files);
 }
 
 TEST_F(RunTest, StoppedItLeavesNothingAndGoesOnToTheSameGenerations) {
