@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "common/trials/read.h"
 #include "tests/integration/diagnose_program.h"
 
 namespace gapfarm::diagnose_pushes_test {
@@ -122,6 +123,30 @@ TEST_F(DiagnosePushes, OfAFewPushesNothingIsReported) {
   EXPECT_TRUE(d["effects"].empty());
   EXPECT_FALSE(std::filesystem::exists(folder_ / "d/model.toml"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "d/tuned.toml"));
+}
+
+TEST_F(DiagnosePushes, PlansPushesWithTheFingersWays) {
+  const std::string config = folder_.write("c.toml", kConfig);
+  const std::string plan = folder_ / "plan/pushes.csv";
+  const Finished planned =
+      gapfarm_command({"plan", config, "--trials", "12", "--pool", "3", "--effects", "com_offset",
+                       "--out", plan, "--workers", "1"});
+  ASSERT_EQ(planned.exit_code, 0) << planned.err;
+  const Finished driven = gapfarm_command({"simulate", config, "--like", plan, "--out",
+                                           folder_ / "driven/pushes.csv", "--workers", "1"});
+  EXPECT_EQ(driven.exit_code, 0) << driven.err;
+  // Each piece is put down where its finger goes, not where the piece before it lies.
+  const std::vector<std::string> pieces = {"square", "triangle"};
+  const auto log = read_trial_files(std::vector<std::string>{plan}, pieces);
+  ASSERT_TRUE(log.ok()) << log.error().message;
+  ASSERT_EQ(log->trials.size(), 12u);
+  for (std::size_t i = 1; i < log->trials.size(); ++i) {
+    EXPECT_NE(log->trials[i].X_WS, log->trials[i - 1].X_WE) << i;
+  }
+  const Finished chained = gapfarm_command(
+      {"plan", config, "--trials", "12", "--chain", "3", "--out", folder_ / "other.csv"});
+  EXPECT_EQ(chained.exit_code, 2);
+  EXPECT_NE(chained.err.find("put down before every push"), std::string::npos) << chained.err;
 }
 
 }  // namespace gapfarm::diagnose_pushes_test

@@ -68,6 +68,12 @@ Status apply_options(PlanOptions& options, Config& config) {
     s.arena_m = place.width_m;
   }
   if (options.sessions) s.sessions = *options.sessions;
+  // A piece is put down before every push.
+  if (!config.problem.pieces.empty()) s.chain = 1;
+  if (options.chain.value_or(s.chain) != s.chain && !config.problem.pieces.empty()) {
+    return Error{fmt::format(
+        "--chain is {}, but a piece is put down before every push; omit --chain", *options.chain)};
+  }
   if (options.chain) s.chain = *options.chain;
   if (!options.levels.empty()) s.levels = options.levels;
   if (!options.durations.empty()) s.durations_s = options.durations;
@@ -171,7 +177,10 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
     return run_plan_drive(options.drive, task, source.config, options.outputs, context);
   }
   RETURN_IF_ERROR(apply_options(options, source.config));
-  RETURN_IF_ERROR(options.outputs.plan({options.out, options.picture}));
+  const bool pushes = !source.config.problem.pieces.empty();
+  std::vector<std::string> outputs = trial_file_names(options.out, false, pushes);
+  outputs.push_back(options.picture);
+  RETURN_IF_ERROR(options.outputs.plan(outputs));
   if (context.dry_run) {
     return print_dry_run(fmt::format("plan {} trials for {} into {}", options.settings.trials,
                                      options.source, options.out),
@@ -179,8 +188,11 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
                          source.config.farm, context);
   }
   ASSIGN_OR_RETURN(const auto plan, design(options, source.config, context));
-  RETURN_IF_ERROR(options.outputs.write(
-      options.out, format_trials(shifted(plan.log, source.frame_x_m, source.frame_y_m))));
+  ASSIGN_OR_RETURN(const auto files,
+                   trial_files(shifted(plan.log, source.frame_x_m, source.frame_y_m), options.out));
+  for (const TrialFile& file : files) {
+    RETURN_IF_ERROR(options.outputs.write(file.path, file.text));
+  }
   if (!options.picture.empty()) {
     RETURN_IF_ERROR(
         options.outputs.write(options.picture, plan::plan_picture(source.config.problem, plan)));
@@ -190,8 +202,9 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
   json["trials"] = plan.log.trials.size();
   context.console.result(
       table_text(plan) + fmt::format("{}: {} trials to drive, in this order; x1, y1, theta1 are "
-                                     "where the model says the robot stops\n",
-                                     options.out, plan.log.trials.size()),
+                                     "where the model says the {} stops\n",
+                                     options.out, plan.log.trials.size(),
+                                     pushes ? "piece" : "robot"),
       json);
   return kExitDone;
 }
