@@ -25,6 +25,10 @@ struct SanityFinding {
   std::vector<std::string> or_else = {};
 };
 
+// Of logs of drives and of pushes alike.
+inline constexpr const char* kEndsSwapped = "ends_swapped";
+inline constexpr const char* kExchangeEnds = "Exchange x0 and x1, y0 and y1, theta0 and theta1.";
+
 inline bool any_unusable(const std::vector<SanityFinding>& findings) {
   return contains(findings, Severity::kUnusable, &SanityFinding::severity);
 }

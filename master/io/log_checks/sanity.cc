@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/trials/context.h"
 #include "master/io/log_checks/drive_checks.h"
 #include "master/io/log_checks/false_readings.h"
 #include "master/io/log_checks/log_checks.h"
@@ -18,6 +19,8 @@ namespace {
 
 constexpr double kMostImpossible = 0.05;  // of the trials
 constexpr double kTimesAsFar = 2;
+// By chance some drives lead back to where the one before began: one in hundreds, of any log.
+constexpr std::size_t kFewestFollowing = 8, kTimesAsMany = 5;
 constexpr double kBeyond_m = 0.3;  // what a camera's seam or a late reading may add
 
 // Nobody says how fast and how wide a program's robot may be, so no log is questioned for it.
@@ -60,6 +63,36 @@ void note_rows(const Problem& problem, const std::vector<std::size_t>& rows, con
                        "Look at these rows; a diagnosis leaves them out.", Severity::kNote});
 }
 
+// Of these trials, how many begin where the one before them ends.
+std::size_t count_following(const TrialLog& log, const std::vector<DriveSample>& samples) {
+  const std::vector<TrialContext> contexts =
+      trial_contexts(log, std::vector<DrivenCommand>(log.trials.size()));
+  return static_cast<std::size_t>(std::ranges::count_if(
+      samples, [&](const DriveSample& s) { return !contexts[s.trial].moved; }));
+}
+
+// check_axes(), unless the trials show that it is before and after that are the wrong way round:
+// exchanged, their axes are right and they follow one another, which as logged they do not.
+std::optional<SanityFinding> check_ways_round(const TrialLog& log,
+                                              std::vector<DriveSample> samples) {
+  auto axes = check_axes(samples);
+  if (!axes) return axes;
+  const std::size_t as_logged = count_following(log, samples);
+  for (DriveSample& s : samples) std::swap(s.X_WS, s.X_WE);
+  if (check_axes(samples)) return axes;
+  TrialLog exchanged = log;
+  for (Trial& t : exchanged.trials) std::swap(t.X_WS, t.X_WE);
+  const std::size_t following = count_following(exchanged, samples);
+  if (following < kFewestFollowing || following < kTimesAsMany * as_logged) return axes;
+  axes->name = kEndsSwapped;
+  axes->text = std::to_string(following) + " of " + std::to_string(samples.size()) +
+               " trials end where the one before them starts, and " + std::to_string(as_logged) +
+               " start where it ends. So before and after are exchanged.";
+  axes->remedy = kExchangeEnds;
+  axes->or_else.clear();
+  return axes;
+}
+
 // One session may have been mounted or wired another way round.
 void check_axes_of_sessions(const Problem& problem, const std::vector<DriveSample>& samples,
                             std::vector<SanityFinding>* findings) {
@@ -68,7 +101,7 @@ void check_axes_of_sessions(const Problem& problem, const std::vector<DriveSampl
     of_session[problem.log.trials[s.trial].session].push_back(s);
   }
   for (const auto& [session, its] : of_session) {
-    auto axes = check_axes(its);
+    auto axes = check_ways_round(problem.log, its);
     if (!axes) continue;
     axes->text = "In session " + session + " alone: " + axes->text;
     axes->remedy = "In session " + session + " alone: " + axes->remedy;
@@ -92,7 +125,7 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
   bool suspicious = check_speed(samples, limits, findings);
   if (check_heading_unit(samples, findings)) {
     suspicious = true;
-  } else if (auto axes = check_axes(samples)) {
+  } else if (auto axes = check_ways_round(problem.log, samples)) {
     findings->push_back(std::move(*axes));
     suspicious = true;
   } else if (check_related(samples, findings)) {

@@ -265,6 +265,29 @@ Problem chained_drives(std::size_t count) {
   return problem;
 }
 
+Problem with_ends_exchanged(Problem problem) {
+  for (Trial& t : problem.log.trials) std::swap(t.X_WS, t.X_WE);
+  return problem;
+}
+
+TEST(Sanity, KnowsBeforeAndAfterThatAreExchanged) {
+  const Problem sound = chained_drives(200);
+  EXPECT_EQ(first_name(sound), "");
+  const auto findings = check_sanity(with_ends_exchanged(sound));
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].name, "ends_swapped") << findings[0].text;
+  EXPECT_EQ(findings[0].severity, Severity::kUnusable);
+  EXPECT_NE(findings[0].remedy.find("x0 and x1"), std::string::npos) << findings[0].remedy;
+}
+
+// Motors that run backward do so from where the robot is; what nothing follows is not known.
+TEST(Sanity, TakesNoMotorsThatRunBackwardForExchangedEnds) {
+  Problem backward = chained_drives(200);
+  for (Trial& t : backward.log.trials) t.left = -*t.left, t.right = -*t.right;
+  EXPECT_EQ(first_name(backward), "direction_reversed");
+  EXPECT_EQ(first_name(with_ends_exchanged(drawn_drives(200))), "direction_reversed");
+}
+
 TEST(Sanity, KnowsReadingsThatOthersContradict) {
   const Problem sound = chained_drives(600);
   EXPECT_EQ(impossible_trials(sound), std::vector<std::size_t>());
