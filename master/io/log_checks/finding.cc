@@ -26,6 +26,7 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"duplicates", "trials are repeated"},
       {"clock_backward", "time runs backward"},
       {"frames_apart", "finger and pieces are not in one frame"},
+      {"untouched", "the finger does not touch the pieces"},
       {"headings_rounded", "headings are rounded"},
       {"impossible_rows", "some rows cannot be"},
       {"false_readings", "some readings are false"}};

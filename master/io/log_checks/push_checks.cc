@@ -33,6 +33,15 @@ constexpr double kTimesAsNear = 3;  // put right
 // Of the reach, of half of the pushes: a unit 2.54 times the right one leaves some 0.5.
 constexpr double kMeets = 0.1;
 
+// Of the finger, m.
+double way_of(const Trial& t) {
+  double way = 0;
+  for (std::size_t k = 1; k < t.tip.size(); ++k) {
+    way += std::hypot(t.tip[k].x - t.tip[k - 1].x, t.tip[k].y - t.tip[k - 1].y);
+  }
+  return way;
+}
+
 // By how much a point lies outside a convex outline; inside it is negative.
 double outside(const Eigen::Vector2d& p_W, const Piece& piece, const Pose& X_WP) {
   double most = -INFINITY;
@@ -45,55 +54,104 @@ double outside(const Eigen::Vector2d& p_W, const Piece& piece, const Pose& X_WP)
   return most;
 }
 
+// As what a log is read: with its pieces' poses put right, in other units.
+struct LogReading {
+  const PoseFault* fault = nullptr;
+  bool exchanged = false;  // before and after
+  double piece_metres = 1, tip_metres = 1;
+
+  Pose start(const Trial& t) const { return pose(exchanged ? t.X_WE : t.X_WS); }
+  Pose end(const Trial& t) const { return pose(exchanged ? t.X_WS : t.X_WE); }
+  Eigen::Vector2d point(const TipSample& tip) const {
+    return {tip_metres * tip.x, tip_metres * tip.y};
+  }
+
+ private:
+  Pose pose(const Pose& X) const {
+    const Pose right = fault == nullptr ? X : fault->put_right(X);
+    return {piece_metres * right.x, piece_metres * right.y, right.theta};
+  }
+};
+
+// How far the finger stays off the outline at its start; below 0: it goes into it.
+double nearest_gap(const Problem& problem, const Trial& t, const LogReading& as) {
+  const Piece& piece = problem.piece(t.command);
+  double nearest = INFINITY;
+  for (const TipSample& tip : t.tip) {
+    nearest = std::min(nearest, outside(as.point(tip), piece, as.start(t)));
+  }
+  return nearest - problem.values[row_of(Push::kFingerRadius)];
+}
+
+bool moves(const Problem& problem, const Trial& t) {
+  return corner_distance(problem.piece(t.command), t.X_WS, t.X_WE) > kStill_m;
+}
+
 // Mean over pushes of how deep the finger lies in the outline as it begins and as it ends, and of
 // how far it stays off a piece that moves, m.
-double misfit(const Problem& problem, const PoseFault* fault) {
+double misfit(const Problem& problem, const LogReading& as) {
   const double finger_m = problem.values[row_of(Push::kFingerRadius)];
   double sum = 0, count = 0;
   for (const Trial& t : problem.log.trials) {
     if (t.tip.empty()) continue;
     const Piece& piece = problem.piece(t.command);
-    const Pose X_WS = fault == nullptr ? t.X_WS : fault->put_right(t.X_WS);
-    const Pose X_WE = fault == nullptr ? t.X_WE : fault->put_right(t.X_WE);
-    const auto gap = [&](const TipSample& tip, const Pose& X) {
-      return outside({tip.x, tip.y}, piece, X) - finger_m;
+    const Pose X_WS = as.start(t), X_WE = as.end(t);
+    const auto depth = [&](const TipSample& tip, const Pose& X) {
+      return std::max(0.0, finger_m - outside(as.point(tip), piece, X));
     };
-    double nearest = INFINITY;
-    for (const TipSample& tip : t.tip) nearest = std::min(nearest, gap(tip, X_WS));
-    const bool moved = corner_distance(piece, X_WS, X_WE) > kStill_m;
-    sum += std::max(0.0, -gap(t.tip.front(), X_WS)) + std::max(0.0, -gap(t.tip.back(), X_WE)) +
-           (moved ? std::max(0.0, nearest) : 0);
+    sum += depth(t.tip.front(), X_WS) + depth(t.tip.back(), X_WE);
+    if (moves(problem, t)) sum += std::max(0.0, nearest_gap(problem, t, as));
     ++count;
   }
   return count > 0 ? sum / count : 0;
 }
 
+// How deep in a piece where it ends, or how far from it, the finger's way goes: the median of
+// pushes, read so.  Nothing is pushed by a finger that hardly moves.
+double misses(const Problem& problem, const LogReading& as, double reach_m) {
+  const double finger_m = problem.values[row_of(Push::kFingerRadius)];
+  std::vector<double> off, ways;
+  for (const Trial& t : problem.log.trials) {
+    if (t.tip.empty()) continue;
+    const Pose X_WE = as.end(t);
+    double nearest = INFINITY, way = 0;
+    for (const TipSample& s : t.tip) {
+      way = std::max(way, std::hypot(s.x - t.tip.front().x, s.y - t.tip.front().y));
+      nearest = std::min(nearest, outside(as.point(s), problem.piece(t.command), X_WE));
+    }
+    off.push_back(std::abs(nearest - finger_m));
+    ways.push_back(as.tip_metres * way);
+  }
+  return median(ways) < kMeets * reach_m ? INFINITY : median(off);
+}
+
 // How finger and outlines do not fit; nothing where they do.
 std::optional<SanityFinding> check_outlines(const Problem& problem, double reach_m) {
-  const double before_m = misfit(problem, nullptr);
+  const double before_m = misfit(problem, {});
   if (before_m < kTouches * reach_m) return std::nullopt;
-  const PoseFault* best = nullptr;
-  double after_m = before_m / kTimesAsNear;
-  for (const PoseFault& fault : kPoseFaults) {
-    const double put_m = misfit(problem, &fault);
-    if (fault.metres != 1 || put_m >= after_m) continue;
-    best = &fault;
-    after_m = put_m;
-  }
   SanityFinding found = {
       "frames_apart",
       "Finger and outlines miss or overlap one another by " + few_digits(1000 * before_m) +
           " mm a push.",
       "Look whether each push has its own piece, its finger's way and its poses, "
-      "in one frame."};
-  if (best == nullptr) {
-    // A camera whose lengths are askew does as much.
-    found.severity = Severity::kNote;
-    return before_m < kApart * reach_m ? std::nullopt : std::optional(found);
+      "in one frame.",
+      // A camera whose lengths are askew does as much.
+      Severity::kNote};
+  const std::string seen = found.text;
+  double after_m = before_m / kTimesAsNear;
+  const auto take = [&](const LogReading& as, const char* name, const char* text,
+                        const char* remedy) {
+    const double put_m = misfit(problem, as);
+    // A finger that stands still or goes elsewhere fits outlines that are put out of its way.
+    if (put_m >= after_m || misses(problem, as, reach_m) >= kMeets * reach_m) return;
+    after_m = put_m;
+    found = {name, seen + " Put right, by " + few_digits(1000 * put_m) + " mm. " + text, remedy};
+  };
+  for (const PoseFault& fault : kPoseFaults) {
+    if (fault.metres == 1) take({.fault = &fault}, fault.name, fault.text, fault.remedy);
   }
-  found.name = best->name;
-  found.text += " Put right, by " + few_digits(1000 * after_m) + " mm. " + best->text;
-  found.remedy = best->remedy;
+  take({.exchanged = true}, kEndsSwapped, "Before and after are exchanged.", kExchangeEnds);
+  if (found.severity == Severity::kNote && before_m < kApart * reach_m) return std::nullopt;
   if (found.name == "sides_swapped") {
     found.name = "axis_mirrored";
     found.remedy = "Negate y and theta of the pieces, or mirror the finger's way.";
@@ -101,27 +159,29 @@ std::optional<SanityFinding> check_outlines(const Problem& problem, double reach
   return found;
 }
 
-// How deep in a piece where it ends, or how far from it, the finger's way goes: the median of
-// pushes, once logged lengths are so many metres.  Nothing is pushed by a finger that hardly moves.
-double misses(const Problem& problem, double piece_metres, double tip_metres, double reach_m) {
-  const double finger_m = problem.values[row_of(Push::kFingerRadius)];
-  std::vector<double> off, ways;
+// Most pieces move although their finger does not come to them; a few are a tracker's.
+std::optional<SanityFinding> check_touches(const Problem& problem, double reach_m) {
+  const double off_m = kApart * reach_m;
+  std::size_t untouched = 0, still = 0, moved = 0;
   for (const Trial& t : problem.log.trials) {
-    if (t.tip.empty()) continue;
-    const Pose X_WE = {piece_metres * t.X_WE.x, piece_metres * t.X_WE.y, t.X_WE.theta};
-    double nearest = INFINITY, way = 0;
-    for (const TipSample& s : t.tip) {
-      way = std::max(way, std::hypot(s.x - t.tip.front().x, s.y - t.tip.front().y));
-      nearest = std::min(
-          nearest, outside({tip_metres * s.x, tip_metres * s.y}, problem.piece(t.command), X_WE));
-    }
-    off.push_back(std::abs(nearest - finger_m));
-    ways.push_back(tip_metres * way);
+    if (t.tip.empty() || !moves(problem, t)) continue;
+    ++moved;
+    if (nearest_gap(problem, t, {}) <= off_m) continue;
+    ++untouched;
+    if (way_of(t) < kStill_m) ++still;
   }
-  return median(ways) < kMeets * reach_m ? INFINITY : median(off);
+  if (2 * untouched <= moved) return std::nullopt;
+  const std::string stay =
+      still == 0 ? "" : ", and " + std::to_string(still) + " of these fingers do not move at all";
+  return SanityFinding{"untouched",
+                       std::to_string(untouched) + " of " + std::to_string(moved) +
+                           " pieces that move are more than " + few_digits(1000 * off_m) +
+                           " mm away from all of their finger's way" + stay + ".",
+                       "Give each push the whole way of its own finger, in the frame and unit of "
+                       "the pieces' poses."};
 }
 
-// Finger and pieces are far apart: a unit is named where in it they touch, push by push.
+// Where finger and pieces do not meet: a unit is named where in it they touch, push by push.
 SanityFinding far_apart(const Problem& problem, double nearest_m, double reach_m) {
   const std::string seen = "The finger comes no closer to a piece's middle than " +
                            few_digits(nearest_m) +
@@ -130,13 +190,15 @@ SanityFinding far_apart(const Problem& problem, double nearest_m, double reach_m
   SanityFinding found = {"frames_apart", seen,
                          "Give finger and pieces in one frame, each push with its own finger's "
                          "way, and check the outlines' unit."};
-  double least = kMeets * reach_m;
+  double least = std::min(kMeets * reach_m, misses(problem, {}, reach_m) / kTimesAsNear);
   for (const LengthUnit& unit : length_units()) {
     for (const bool pieces : {true, false}) {
       for (const bool finger : {true, false}) {
-        const double left =
-            misses(problem, pieces ? unit.metres : 1, finger ? unit.metres : 1, reach_m);
+        const LogReading as = {.piece_metres = pieces ? unit.metres : 1,
+                               .tip_metres = finger ? unit.metres : 1};
+        const double left = misses(problem, as, reach_m);
         if (left >= least || !(pieces || finger)) continue;
+        if (misfit(problem, as) >= kMeets * reach_m) continue;
         least = left;
         const std::string whose = !finger ? "pieces" : !pieces ? "finger" : "pieces and finger";
         found = {"unit_error",
@@ -178,11 +240,7 @@ void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) 
   if (distances.empty()) return;
   std::vector<TrialLength> ways;
   for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
-    const std::vector<TipSample>& tip = problem.log.trials[i].tip;
-    double way = 0;
-    for (std::size_t k = 1; k < tip.size(); ++k) {
-      way += std::hypot(tip[k].x - tip[k - 1].x, tip[k].y - tip[k - 1].y);
-    }
+    const double way = way_of(problem.log.trials[i]);
     if (way > 0) ways.push_back({i, way});
   }
   if (check_mixed_units(problem.log, std::move(ways), "pushes",
@@ -190,14 +248,18 @@ void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) 
     return;
   }
   const double nearest = median(distances), reach = median(reaches);
-  auto outlines = check_outlines(problem, reach);
-  const bool near = nearest < kFar * reach;
-  if (outlines && (near || outlines->severity != Severity::kNote)) {
-    findings->push_back(*std::move(outlines));
-    return;
+  auto found = check_outlines(problem, reach);
+  if (!found || found->severity == Severity::kNote) {
+    const bool near = nearest < kFar * reach;
+    if (near && !found && misses(problem, {}, reach) < kMeets * reach) return;
+    SanityFinding apart = far_apart(problem, nearest, reach);
+    if (!near || apart.name == "unit_error") {
+      found = std::move(apart);
+    } else if (auto untouched = check_touches(problem, reach)) {
+      found = std::move(untouched);
+    }
   }
-  if (near) return;
-  findings->push_back(far_apart(problem, nearest, reach));
+  if (found) findings->push_back(*std::move(found));
 }
 
 }  // namespace gapfarm

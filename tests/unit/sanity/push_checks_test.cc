@@ -96,6 +96,40 @@ TEST(PushChecks, NameHowPosesDoNotFitTheFingersWay) {
   }
 }
 
+TEST(PushChecks, NameEndsThatAreExchanged) {
+  Problem problem = pushed();
+  for (Trial& t : problem.log.trials) std::swap(t.X_WS, t.X_WE);
+  EXPECT_EQ(named(problem), "ends_swapped");
+}
+
+// From 2 cm off the piece the finger goes away from it, or nowhere; a few such pushes are fine.
+TEST(PushChecks, RefusePiecesThatMoveUntouched) {
+  for (const double sense : {-1.0, 0.0}) {
+    for (const std::size_t count : {3, 20}) {
+      Problem problem = pushed();
+      for (std::size_t i = 0; i < count; ++i) {
+        std::vector<TipSample>& tip = problem.log.trials[i].tip;
+        const TipSample from = tip.front();
+        for (TipSample& s : tip) {
+          s.x = from.x + sense * (s.x - from.x);
+          s.y = from.y + sense * (s.y - from.y);
+        }
+      }
+      std::vector<SanityFinding> findings;
+      check_pushes(problem, &findings);
+      if (count == 3) {
+        EXPECT_FALSE(any_unusable(findings)) << findings[0].text;
+        continue;
+      }
+      ASSERT_EQ(findings.size(), 1u);
+      EXPECT_EQ(findings[0].name, "untouched");
+      EXPECT_EQ(findings[0].severity, Severity::kUnusable);
+      EXPECT_EQ(findings[0].text.find("20 of 20 pieces"), 0u) << findings[0].text;
+      EXPECT_EQ(findings[0].text.find("do not move at all") != std::string::npos, sense == 0);
+    }
+  }
+}
+
 // Pieces, finger or both in another unit are named as what they are; a finger elsewhere is no unit.
 TEST(PushChecks, NameTheUnitInWhichFingerAndPiecesMeet) {
   const auto finding = [](double pieces, double tip, double shift) {
@@ -108,7 +142,7 @@ TEST(PushChecks, NameTheUnitInWhichFingerAndPiecesMeet) {
     check_pushes(problem, &findings);
     return findings.empty() ? SanityFinding{} : findings.front();
   };
-  for (const double units : {1000.0, 100.0}) {
+  for (const double units : {1000.0, 100.0, 1 / 0.0254, 1 / 0.3048}) {
     const std::string by = " by " + few_digits(1 / units) + ".";
     EXPECT_EQ(finding(units, units, 0).remedy, "Multiply the positions of pieces and finger" + by);
     EXPECT_EQ(finding(units, 1, 0).remedy, "Multiply the positions of pieces" + by);
