@@ -6,7 +6,6 @@
 #include <map>
 #include <numbers>
 #include <set>
-#include <tuple>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -17,7 +16,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kManyCopies = 0.2;             // of the trials that moved
+constexpr double kManyCopies = 0.2;  // of the trials that moved
+constexpr double kCopy = 1e-5;       // m, rad: a fiftieth of the least noise of poses in the tables
 constexpr double kLeastHeadingStep_rad = 5e-3;  // finer ones are hidden by any tracker's noise
 constexpr double kManySteps = 0.02;             // back in time, of all steps
 constexpr std::array<LengthUnit, 5> kUnits = {{{"millimetres", 0.001},
@@ -119,24 +119,33 @@ void check_count(const TrialLog& log, std::vector<SanityFinding>* findings) {
 }
 
 void check_copies(const TrialLog& log, std::vector<SanityFinding>* findings) {
-  using Key = std::tuple<double, double, double, double, double, double>;
-  std::map<Key, const Trial*> seen;
+  using Key = std::array<double, 6>;
+  std::map<Key, const Trial*> seen[2];  // on two grids: what one parts is within a cell of another
   std::size_t copies = 0, moved = 0;
+  bool exact = true;
   std::string example;
   for (const Trial& t : log.trials) {
     if (t.X_WS == t.X_WE) continue;
     ++moved;
-    const Key key{t.X_WS.x, t.X_WS.y, t.X_WS.theta, t.X_WE.x, t.X_WE.y, t.X_WE.theta};
-    const auto [first, fresh] = seen.try_emplace(key, &t);
-    if (fresh) continue;
-    if (copies++ == 0) example = row_text(t) + " and " + row_text(*first->second);
+    const Trial* of = nullptr;
+    for (const double shift : {0.0, 0.5}) {
+      const auto cell = [&](double at) { return std::round(at / kCopy + shift); };
+      const Key key = {cell(t.X_WS.x), cell(t.X_WS.y), cell(t.X_WS.theta),
+                       cell(t.X_WE.x), cell(t.X_WE.y), cell(t.X_WE.theta)};
+      const auto [first, fresh] = seen[shift > 0].try_emplace(key, &t);
+      if (!fresh) of = first->second;
+    }
+    if (of == nullptr) continue;
+    exact &= t.X_WS == of->X_WS && t.X_WE == of->X_WE;
+    if (copies++ == 0) example = row_text(t) + " and " + row_text(*of);
   }
   if (copies == 0) return;
   const bool many = static_cast<double>(copies) > kManyCopies * static_cast<double>(moved);
   findings->push_back({"duplicates",
                        std::to_string(copies) + " of " + std::to_string(moved) +
-                           " trials repeat the poses of another one to the last digit (" + example +
-                           "): no two drives are that much alike.",
+                           " trials repeat the poses of another one to " +
+                           (exact ? "the last digit" : few_digits(1e3 * kCopy) + " mm and mrad") +
+                           " (" + example + "): no two drives are that much alike.",
                        "Leave the copies out: they count the same evidence twice.",
                        many ? Severity::kUnusable : Severity::kNote});
 }

@@ -11,7 +11,7 @@
 namespace gapfarm {
 
 void check_count(const TrialLog& log, std::vector<SanityFinding>* findings);
-// Rows that repeat another one's poses to the last digit although something moved.
+// Rows that repeat another one's poses, far below any noise, although something moved.
 void check_copies(const TrialLog& log, std::vector<SanityFinding>* findings);
 // Headings that were rounded to a grid.
 void check_headings(const TrialLog& log, std::vector<SanityFinding>* findings);

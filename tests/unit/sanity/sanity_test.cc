@@ -368,6 +368,8 @@ TEST(Sanity, WarningsCopiesAndClocksThatRunBackward) {
     twice.log.trials.push_back(t);
   }
   EXPECT_EQ(first_name(twice), "duplicates");
+  for (std::size_t i = 100; i < 200; ++i) twice.log.trials[i].X_WE.x += 1e-6;
+  EXPECT_THAT(check_sanity(twice).front().text, testing::HasSubstr("100 of 200 trials repeat"));
   for (Trial& t : log.log.trials) t.t_s = 1000 - *t.t_s;
   EXPECT_EQ(first_name(log), "clock_backward");
 }
