@@ -294,6 +294,16 @@ TEST_F(ObjectiveRuns, OfSeveralValuesTheFrontIsFoundAndAnyMemberMakesAModel) {
   EXPECT_THAT(text_of(folder_.path() / "page.html"), HasSubstr("What is traded off"));
 }
 
+TEST_F(ObjectiveRuns, CheckCallsNoGeneIdleThatMovesAnyOfSeveralValues) {
+  const std::string second = "    answer = {'id': task['id'], 'values': {'near': x, 'far': n}}\n";
+  const Finished checked = gapfarm_command(
+      {"check", config(second, kTwoOf, "[optimiser]\nkind = \"nsga2\"\n"), "--json"});
+  EXPECT_EQ(checked.exit_code, 2) << checked.err;
+  const json idle = json::parse(checked.out)["idle_genes"];
+  ASSERT_EQ(idle.size(), 1u) << idle;
+  EXPECT_EQ(idle[0]["parameter"], "side");
+}
+
 TEST_F(ObjectiveRuns, SeveralValuesNeedTheirNamesAndNsga2) {
   const struct {
     const char *objective, *more, *named;

@@ -43,10 +43,13 @@ Result<std::vector<char>> moving(Farm& farm, const Config& config, const Problem
   ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
   const v1::TaskResult& there = results.front();
   const bool scored = there.outcome() == v1::OK;
+  // Of several objectives the fitness is the first.
+  const auto same = [](const v1::EvaluateResult& a, const v1::EvaluateResult& b) {
+    return a.fitness() == b.fitness() && std::ranges::equal(a.objectives(), b.objectives());
+  };
   for (std::size_t k = 0; k < genes.size(); ++k) {
     const v1::TaskResult& moved = results[k + 1];
-    if (!scored || moved.outcome() != v1::OK ||
-        moved.evaluate().fitness() != there.evaluate().fitness()) {
+    if (!scored || moved.outcome() != v1::OK || !same(moved.evaluate(), there.evaluate())) {
       known[genes[k]] = 1;
     }
   }
