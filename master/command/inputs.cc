@@ -362,17 +362,18 @@ void report_to(Console& console, SocketFarmOptions& options) {
   };
 }
 
-Result<FittedRuns> open_fitted(const std::string& source, Console& console) {
+Result<FittedRuns> open_fitted(const std::string& source, const std::vector<std::string>& folders,
+                               Console& console) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(source, ignored)) {
-    ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {}));
+    ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {.files = folders, .read = {}}));
     return FittedRuns{config.problem, config.problem.values, config.windows, config.trial_files,
                       config.robot_path};
   }
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(source));
   ASSIGN_OR_RETURN(auto problem, stored_problem(reader));
   ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
-  return FittedRuns{problem, model.values, {}, model.data.files};
+  return FittedRuns{problem, model.values, {}, folders.empty() ? model.data.files : folders};
 }
 
 }  // namespace gapfarm

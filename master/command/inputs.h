@@ -134,8 +134,10 @@ struct FittedRuns {
   std::string robot_path = {};  // of a config
 };
 
-// A finished run's, or a config's own.
-Result<FittedRuns> open_fitted(const std::string& source, Console& console);
+// A finished run's, or a config's own; `folders`, where some are given, are in place of what was
+// fitted to or the config names.
+Result<FittedRuns> open_fitted(const std::string& source, const std::vector<std::string>& folders,
+                               Console& console);
 
 // An error where the model is one of another scenario or robot than the config's.
 Status check_same_robot(const Model& model, const std::string& path, const Config& config,

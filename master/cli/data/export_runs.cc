@@ -163,18 +163,17 @@ void add_run(const DrivenPath& path, const RunLog& log, const std::vector<ShownP
 Result<int> export_runs(ExportCommand& command, CliContext& context) {
   Console& console = context.console;
   if (command.out.empty()) return Error{"runs: name a folder to write to with --out"};
-  ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, console));
+  ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, command.runs, console));
   if (!fitted.problem.windows()) {
     return Error{command.source + ": scenario " + fitted.problem.scenario +
                  " has no runs; gapfarm predict compares its trials"};
   }
-  const auto& folders = command.runs.empty() ? fitted.folders : command.runs;
   const auto channels = fitted.problem.channels();
-  ASSIGN_OR_RETURN(auto log, read_run_folders(folders, channels));
+  ASSIGN_OR_RETURN(auto log, read_run_folders(fitted.folders, channels));
   log.channels.assign(channels.begin(), channels.end());
   command.outputs.reads(command.source);
   command.outputs.reads(fitted.robot_path);
-  command.outputs.reads_runs(folders);
+  command.outputs.reads_runs(fitted.folders);
   std::vector<std::string> names = {kMcapName};
   for (const LoggedRun& run : log.runs) names.push_back(file_of(session_of(run)));
   RETURN_IF_ERROR(command.outputs.plan_in(command.out, names));

@@ -38,19 +38,17 @@ Status draw_runs(const HorizonsCommand& command, const FittedRuns& fitted, const
 
 Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
-  ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, console));
+  ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, command.runs, console));
   command.outputs.reads(command.source);
   command.outputs.reads(fitted.robot_path);
   command.outputs.reads_runs(fitted.folders);
-  command.outputs.reads_runs(command.runs);
   RETURN_IF_ERROR(command.outputs.plan({command.picture, command.out}));
   if (!fitted.problem.windows()) {
     return Error{command.source + ": scenario " + fitted.problem.scenario +
                  " has no runs to cut into windows; gapfarm predict compares its trials"};
   }
   ASSIGN_OR_RETURN(const auto runs,
-                   read_run_folders(command.runs.empty() ? fitted.folders : command.runs,
-                                    fitted.problem.channels()));
+                   read_run_folders(fitted.folders, fitted.problem.channels()));
   for (const std::string& note : runs.notes) console.note(note);
   if (context.dry_run) {
     return print_dry_run("measure horizons of " + command.source,

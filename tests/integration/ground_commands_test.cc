@@ -1,0 +1,61 @@
+// Commands about a ground robot's runs, on two short drives straight ahead.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm::ground_commands_test {
+
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class GroundCommands : public ::testing::Test {
+ protected:
+  // A folder of runs "1", "2", ...: each commanded 0.2 m/s for 4 s, and gone at `speeds`.
+  void write_runs(const std::string& name, const std::vector<double>& speeds) const {
+    std::string commands = "run,t,v,omega\n", poses = "run,t,x,y,theta\n";
+    for (std::size_t r = 0; r < speeds.size(); ++r) {
+      const std::string run = std::to_string(r + 1) + ",";
+      commands += run + "0,0.2,0\n" + run + "4,0,0\n";
+      for (int i = 0; i <= 100; ++i) {
+        const double t_s = 0.05 * i;
+        poses += run + std::to_string(t_s) + "," +
+                 std::to_string(speeds[r] * std::min(t_s, 4.0)) + ",0,0\n";
+      }
+    }
+    folder_.write(name + "/commands.csv", commands);
+    folder_.write(name + "/poses.csv", poses);
+  }
+
+  std::string config(const std::string& more) const {
+    return folder_.write("car.toml",
+                         "scenario = \"ground\"\n[robot]\nfile = \"robot.toml\"\n" + more);
+  }
+
+  GroundCommands() { write_runs("monday", {0.2, 0.15}); }
+
+  const TemporaryFolder folder_;
+  const std::string robot_ = folder_.write(
+      "robot.toml",
+      "drive = \"differential\"\ncommands = [\"v\", \"omega\"]\n"
+      "wheel_separation = 0.3\nwheel_radius = 0.05\n");
+};
+
+TEST_F(GroundCommands, RunsOfTheCommandLineDoWhereTheConfigNamesNone) {
+  const std::string bare = config(""), monday = folder_ / "monday";
+  const Finished horizons =
+      gapfarm_command({"horizons", bare, "--trials", monday, "--workers", "1"});
+  EXPECT_EQ(horizons.exit_code, 0) << horizons.err;
+  EXPECT_THAT(horizons.out, HasSubstr("whole"));
+  const Finished exported =
+      gapfarm_command({"export", "runs", bare, "--trials", monday, "--out", folder_ / "out"});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/2.csv"));
+}
+
+}  // namespace gapfarm::ground_commands_test
