@@ -16,8 +16,8 @@ struct IdleGene {
 };
 
 // Genes whose moving by half their range changes no score, of several objectives none, to the last
-// bit: at the config's own values, nor at two points drawn from the genes' ranges.  One evaluation a
-// gene where all do something.  Those of a user's program that are there only sometimes are not
+// bit: at the config's own values, nor at two points drawn from the genes' ranges.  One evaluation
+// a gene where all do something.  Those of a user's program that are there only sometimes are not
 // looked at, and none is found where nothing could be evaluated.  Errors: the farm's.
 Result<std::vector<IdleGene>> idle_genes(Farm& farm, const Config& config);
 

@@ -47,8 +47,7 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
     return Error{command.source + ": scenario " + fitted.problem.scenario +
                  " has no runs to cut into windows; gapfarm predict compares its trials"};
   }
-  ASSIGN_OR_RETURN(const auto runs,
-                   read_run_folders(fitted.folders, fitted.problem.channels()));
+  ASSIGN_OR_RETURN(const auto runs, read_run_folders(fitted.folders, fitted.problem.channels()));
   for (const std::string& note : runs.notes) console.note(note);
   if (context.dry_run) {
     return print_dry_run("measure horizons of " + command.source,
