@@ -7,6 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "common/math/statistics.h"
 #include "common/pose/extent.h"
 #include "common/recordings/windows.h"
 #include "common/svg/svg.h"
@@ -53,13 +54,6 @@ Result<std::vector<Pose>> simulated_ends(Farm& farm, const Problem& problem) {
   RETURN_IF_ERROR(ended_well(result));
   return mapped(result.predict().predictions(),
                 [](const v1::Predicted& p) { return from_proto(p.end()); });
-}
-
-double middle_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double end_distance(const std::vector<Pose>& a, const std::vector<Pose>& b) {
@@ -128,8 +122,9 @@ Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const Paramet
     off_before.push_back(end_distance(path.before, path.logged));
     off_after.push_back(end_distance(path.after, path.logged));
   }
-  paths.before_m = middle_of(off_before);
-  paths.after_m = middle_of(off_after);
+  if (off_after.empty()) return paths;
+  paths.before_m = median(off_before);
+  paths.after_m = median(off_after);
   return paths;
 }
 

@@ -24,8 +24,8 @@ class GroundCommands : public ::testing::Test {
       commands += run + "0,0.2,0\n" + run + "4,0,0\n";
       for (int i = 0; i <= 100; ++i) {
         const double t_s = 0.05 * i;
-        poses += run + std::to_string(t_s) + "," +
-                 std::to_string(speeds[r] * std::min(t_s, 4.0)) + ",0,0\n";
+        poses += run + std::to_string(t_s) + "," + std::to_string(speeds[r] * std::min(t_s, 4.0)) +
+                 ",0,0\n";
       }
     }
     folder_.write(name + "/commands.csv", commands);
@@ -40,10 +40,10 @@ class GroundCommands : public ::testing::Test {
   GroundCommands() { write_runs("monday", {0.2, 0.15}); }
 
   const TemporaryFolder folder_;
-  const std::string robot_ = folder_.write(
-      "robot.toml",
-      "drive = \"differential\"\ncommands = [\"v\", \"omega\"]\n"
-      "wheel_separation = 0.3\nwheel_radius = 0.05\n");
+  const std::string robot_ =
+      folder_.write("robot.toml",
+                    "drive = \"differential\"\ncommands = [\"v\", \"omega\"]\n"
+                    "wheel_separation = 0.3\nwheel_radius = 0.05\n");
 };
 
 TEST_F(GroundCommands, RunsOfTheCommandLineDoWhereTheConfigNamesNone) {
@@ -56,6 +56,14 @@ TEST_F(GroundCommands, RunsOfTheCommandLineDoWhereTheConfigNamesNone) {
       gapfarm_command({"export", "runs", bare, "--trials", monday, "--out", folder_ / "out"});
   EXPECT_EQ(exported.exit_code, 0) << exported.err;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/2.csv"));
+}
+
+TEST_F(GroundCommands, TheMedianOfTwoEndsIsTheirMean) {
+  const Finished exported =
+      gapfarm_command({"export", "runs", config("[runs]\nfolders = [\"monday\"]\n"), "--out",
+                       folder_ / "out", "--json"});
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_NEAR(json::parse(exported.out)["simulated_m"], (0 + 4 * 0.05) / 2, 0.01);
 }
 
 }  // namespace gapfarm::ground_commands_test
