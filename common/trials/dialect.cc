@@ -126,4 +126,57 @@ TableHead read_head(const std::vector<CsvRow>& rows, char separator) {
   return head;
 }
 
+Status check_decimals(const std::vector<CsvRow>& rows, std::size_t first, char separator,
+                      const std::string& file) {
+  const CsvField* point = nullptr;
+  const CsvField* comma = nullptr;
+  for (std::size_t r = first; r < rows.size() && separator != ','; ++r) {
+    for (const CsvField& field : rows[r].fields) {
+      if (!parse_decimal(field.text, separator)) continue;
+      if (field.text.find('.') != std::string::npos && point == nullptr) point = &field;
+      if (field.text.find(',') != std::string::npos && comma == nullptr) comma = &field;
+    }
+  }
+  if (point == nullptr || comma == nullptr) return {};
+  return text_error(file, comma->place, quoted_word(comma->text),
+                    "decimal points, as in " + quoted_word(point->text) + " in line " +
+                        std::to_string(point->place.line),
+                    "write all decimals alike, and no separators of thousands");
+}
+
+std::vector<std::string_view> words_of(std::string_view line) {
+  std::vector<std::string_view> tokens;
+  for (std::size_t at = line.find_first_not_of(" \t"); at != line.npos;) {
+    const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
+    tokens.push_back(line.substr(at, end - at));
+    at = line.find_first_not_of(" \t", end);
+  }
+  return tokens;
+}
+
+std::string blanks_to_commas(std::string_view text) {
+  std::string out;
+  bool numbers = false;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    std::string_view line = text.substr(at, end - at);
+    at = end + 1;
+    if (line.find_first_of(",;\"\t") != line.npos) return "";
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    std::vector<std::string_view> tokens = words_of(line);
+    if (!tokens.empty() && (tokens[0][0] == '#' || tokens[0][0] == '%')) {
+      tokens[0].remove_prefix(1);
+      if (tokens[0].empty()) tokens.erase(tokens.begin());
+      if (out.find_first_not_of('\n') != out.npos) tokens.clear();
+    }
+    if (tokens.size() == 1) return "";
+    for (std::size_t i = 0; i < tokens.size(); ++i) {
+      numbers = numbers || parse_double(tokens[i]);
+      out += (i == 0 ? "" : ",") + std::string(tokens[i]);
+    }
+    out += '\n';
+  }
+  return numbers ? out : "";
+}
+
 }  // namespace gapfarm

@@ -22,6 +22,9 @@ class Mistakes {
   // Every row of a file has mistakes.
   void add_no_row(const std::string& file);
 
+  // Rows that are omitted, so far.
+  std::size_t omitted() const { return skip_rows_ ? rows_ : 0; }
+
   // OK when there are none, or rows alone that are omitted.  Else all of them, a line each kind
   // with the places of all its rows; of many the first and their number.
   Status status() const;

@@ -35,10 +35,10 @@ struct ImportOptions {
 
 namespace fs = std::filesystem;
 
-Result<std::vector<Recording>> read_all(const std::vector<std::string>& files) {
+Result<std::vector<Recording>> read_all(const std::vector<std::string>& files, bool skip_invalid) {
   std::vector<Recording> recordings;
   for (const std::string& file : files) {
-    ASSIGN_OR_RETURN(Recording recording, read_recording(file));
+    ASSIGN_OR_RETURN(Recording recording, read_recording(file, skip_invalid));
     recordings.push_back(std::move(recording));
   }
   return recordings;
@@ -116,7 +116,8 @@ Result<int> import_runs(ImportOptions& options, CliContext& context) {
   Outputs& outputs = options.outputs;
   for (const std::string& file : options.files) outputs.reads(file);
   if (!options.map.empty()) outputs.reads(options.map);
-  ASSIGN_OR_RETURN(const std::vector<Recording> recordings, read_all(options.files));
+  ASSIGN_OR_RETURN(const std::vector<Recording> recordings,
+                   read_all(options.files, options.reading.read.skip_invalid));
   ASSIGN_OR_RETURN(LogMap map, read_map(options.map, recordings));
   if (options.map.empty()) drive_by_wheels(map);
   for (const std::string& note : map.notes) console.note(printable(note));

@@ -38,6 +38,6 @@ class FileSource : public ByteSource {
 #include "master/io/logs/formats.inc"
 
 // Any log, recognised by its content.
-Result<Recording> read_recording(const std::string& path);
+Result<Recording> read_recording(const std::string& path, bool skip_invalid = false);
 
 }  // namespace gapfarm

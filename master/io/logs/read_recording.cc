@@ -68,7 +68,7 @@ bool FileSource::read(std::uint64_t offset, std::size_t count, std::string& to) 
   return file_.gcount() == static_cast<std::streamsize>(count);
 }
 
-Result<Recording> read_recording(const std::string& path) {
+Result<Recording> read_recording(const std::string& path, bool skip_invalid) {
   ASSIGN_OR_RETURN(auto source, FileSource::open(path));
   std::string head;
   source.read(0, std::min<std::uint64_t>(source.size(), 16), head);
@@ -76,7 +76,7 @@ Result<Recording> read_recording(const std::string& path) {
   if (head.rfind(begins, 0) == 0) return read_##file(source, path);
 #include "master/io/logs/formats.inc"
   ASSIGN_OR_RETURN(const auto text, read_text_file(path));
-  return parse_text_log(text, path);
+  return parse_text_log(text, path, skip_invalid);
 }
 
 RunFiles format_runs(const RunLog& log) {

@@ -3,12 +3,14 @@
 #include <cstdlib>
 #include <ctime>
 #include <limits>
+#include <map>
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/trials/dialect.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
+#include "common/trials/text/mistakes.h"
 #include "master/io/logs/log_table.h"
 
 namespace gapfarm {
@@ -46,18 +48,8 @@ std::string_view first_line(std::string_view text) {
   return text.substr(0, text.find_first_of("\r\n"));
 }
 
-std::vector<std::string_view> tokens_of(std::string_view line) {
-  std::vector<std::string_view> tokens;
-  for (std::size_t at = line.find_first_not_of(" \t"); at != line.npos;) {
-    const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
-    tokens.push_back(line.substr(at, end - at));
-    at = line.find_first_not_of(" \t", end);
-  }
-  return tokens;
-}
-
 // `t x y z qx qy qz qw`, blanks between, comments with '#'.
-Result<Recording> parse_tum(std::string_view text, const std::string& file) {
+Result<Recording> parse_tum(std::string_view text, const std::string& file, Mistakes& mistakes) {
   LogTable table{file, "", "tum", {"t", "x", "y", "z", "qx", "qy", "qz", "qw"}, {}};
   std::size_t line_number = 0;
   for (std::size_t at = 0; at < text.size(); ++line_number) {
@@ -65,20 +57,26 @@ Result<Recording> parse_tum(std::string_view text, const std::string& file) {
     std::string_view line = text.substr(at, end - at);
     at = end + 1;
     if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    const std::vector<std::string_view> tokens = tokens_of(line);
+    const std::vector<std::string_view> tokens = words_of(line);
     if (tokens.empty() || tokens[0][0] == '#') continue;
     if (tokens.size() != 8) {
-      return text_error(file, {line_number + 1, 1}, std::to_string(tokens.size()) + " numbers",
-                        "8 (t x y z qx qy qz qw)", "check the line");
+      mistakes.add_row(
+          {text_error(file, {line_number + 1, 1}, std::to_string(tokens.size()) + " numbers",
+                      "8 (t x y z qx qy qz qw)", "check the line")});
+      table.values.insert(table.values.end(), 8, kBlank);
+      continue;
     }
+    std::vector<double> pose;
+    std::vector<Error> errors;
     for (const std::string_view word : tokens) {
-      const auto value = parse_double(word);
-      if (!value || !std::isfinite(*value)) {
-        return text_error(file, {line_number + 1, 1}, quoted_word(word), "a number",
-                          "remove poses that were not measured");
-      }
-      table.values.push_back(*value);
+      pose.push_back(parse_double(word).value_or(kBlank));
+      if (std::isfinite(pose.back())) continue;
+      errors.push_back(text_error(file, {line_number + 1, 1}, quoted_word(word), "a number",
+                                  "remove poses that were not measured"));
     }
+    mistakes.add_row(errors);
+    if (!errors.empty()) pose.assign(8, kBlank);
+    table.values.insert(table.values.end(), pose.begin(), pose.end());
   }
   if (table.values.empty()) return text_error(file, {}, "no poses", "lines t x y z qx qy qz qw");
   return Recording{file, "a TUM trajectory", {std::move(table)}, "", {}};
@@ -169,6 +167,20 @@ bool fits(const EchoType& type, const CsvRow& row, bool longer) {
   return true;
 }
 
+// Blanks rows from `first` on of another number of fields: where each row leads on from the one
+// before, what lies before and behind it is not one.
+void blank_other_widths(std::size_t first, std::size_t width, const std::string& expected,
+                        const std::string& remedy, const std::string& file,
+                        std::vector<CsvRow>* rows, Mistakes& mistakes) {
+  for (std::size_t r = first; r < rows->size(); ++r) {
+    CsvRow& row = (*rows)[r];
+    if (row.fields.size() == width) continue;
+    mistakes.add_row({text_error(file, row.end, std::to_string(row.fields.size()) + " fields",
+                                 std::to_string(width) + expected, remedy)});
+    row.fields.assign(width, {"", row.end});
+  }
+}
+
 // Numbers without names: a map may call the columns column_1, column_2, ...
 Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::string& file,
                                 char separator) {
@@ -182,11 +194,6 @@ Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::stri
     table.columns.push_back("column_" + std::to_string(i + 1));
   }
   for (const CsvRow& row : rows) {
-    if (row.fields.size() != width) {
-      return text_error(file, row.end, std::to_string(row.fields.size()) + " fields",
-                        std::to_string(width) + " as in the first line",
-                        "the last line may have broken off: remove it");
-    }
     for (const CsvField& field : row.fields) {
       table.values.push_back(number_of(field.text, separator));
     }
@@ -199,8 +206,10 @@ Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::stri
   return recording;
 }
 
-Result<Recording> parse_echo(const std::vector<CsvRow>& rows, const std::string& file,
-                             char separator) {
+Result<Recording> parse_echo(std::vector<CsvRow> rows, const std::string& file, char separator,
+                             Mistakes& mistakes) {
+  blank_other_widths(0, rows.front().fields.size(), " as in the first line",
+                     "the last line may have broken off: remove it", file, &rows, mistakes);
   for (const EchoType& type : echo_types()) {
     // Odometry and poses with covariance are followed by 36 numbers and more.
     const std::string_view name = type.type;
@@ -212,11 +221,6 @@ Result<Recording> parse_echo(const std::vector<CsvRow>& rows, const std::string&
       if (column != "-" && column != "sec" && column != "nanosec") table.columns.push_back(column);
     }
     for (const CsvRow& row : rows) {
-      if (row.fields.size() != rows.front().fields.size()) {
-        return text_error(file, row.end, std::to_string(row.fields.size()) + " fields",
-                          std::to_string(rows.front().fields.size()) + " as in the first line",
-                          "the last line may have broken off: remove it");
-      }
       for (std::size_t i = 0; i < type.columns.size(); ++i) {
         const double value = number_of(row.fields[i].text);
         if (type.columns[i] == "nanosec") {
@@ -262,26 +266,34 @@ Result<std::vector<std::string>> column_names(const TableHead& head, const std::
   return names;
 }
 
-// A log writes its decimals one way: where points and commas are mixed, one of them groups digits.
-Status check_decimals(const std::vector<CsvRow>& rows, std::size_t first, char separator,
-                      const std::string& file) {
-  const CsvField* point = nullptr;
-  const CsvField* comma = nullptr;
-  for (std::size_t r = first; r < rows.size() && separator != ','; ++r) {
-    for (const CsvField& field : rows[r].fields) {
-      if (!parse_decimal(field.text, separator)) continue;
-      if (field.text.find('.') != std::string::npos && point == nullptr) point = &field;
-      if (field.text.find(',') != std::string::npos && comma == nullptr) comma = &field;
-    }
+struct Word {
+  std::size_t row, column;
+  const CsvField* field;
+};
+
+// Blanks rows with a word where 20 times as many have none: a column of numbers with a slip in it
+// is no column of words.
+void blank_slips(const std::vector<Word>& words, const std::string& file, LogTable* table,
+                 Mistakes& mistakes) {
+  std::vector<std::size_t> count(table->columns.size(), 0);
+  for (const Word& word : words) ++count[word.column];
+  std::map<std::size_t, std::vector<Error>> errors;  // of each row
+  for (const Word& word : words) {
+    if (table->rows() < 21 * count[word.column]) continue;
+    const std::string column = "column " + quoted_word(table->columns[word.column]);
+    errors[word.row].push_back(
+        text_error(file, word.field->place, column + " " + quoted_word(word.field->text),
+                   "a number, as in its other rows", "correct it or leave it empty"));
   }
-  if (point == nullptr || comma == nullptr) return {};
-  return text_error(file, comma->place, quoted_word(comma->text),
-                    "decimal points, as in " + quoted_word(point->text) + " in line " +
-                        std::to_string(point->place.line),
-                    "write all decimals alike, and no separators of thousands");
+  for (const auto& [row, all] : errors) {
+    mistakes.add_row(all);
+    std::fill_n(table->values.begin() + static_cast<long>(row * count.size()), count.size(),
+                kBlank);
+  }
 }
 
-Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file, char separator) {
+Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file, char separator,
+                               Mistakes& mistakes) {
   drop_empty_last(&rows);
   const TableHead head = read_head(rows, separator);
   ASSIGN_OR_RETURN(const auto names, column_names(head, file));
@@ -289,22 +301,19 @@ Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file
   for (const CsvField& field : head.titles) table.titles.push_back(field.text);
   table.units = head.units;
   if (Status s = check_decimals(rows, head.rows, separator, file); !s) return s.error();
-  std::vector<std::size_t> bad(table.columns.size(), 0), good(table.columns.size(), 0);
-  std::vector<const CsvField*> example(table.columns.size(), nullptr);
+  blank_other_widths(head.rows, names.size(),
+                     " as in the header, separated by " +
+                         (separator == '\t' ? "tabs" : quoted_word({&separator, 1})),
+                     "leave unknown values empty, but keep their separators", file, &rows,
+                     mistakes);
+  std::vector<Word> words;
   for (std::size_t r = head.rows; r < rows.size(); ++r) {
     const auto& fields = rows[r].fields;
-    if (fields.size() != table.columns.size()) {
-      return text_error(file, rows[r].end, std::to_string(fields.size()) + " fields",
-                        std::to_string(table.columns.size()) + " as in the header, separated by " +
-                            (separator == '\t' ? "tabs" : quoted_word({&separator, 1})),
-                        "leave unknown values empty, but keep their separators");
-    }
     for (std::size_t i = 0; i < fields.size(); ++i) {
       const double value = number_of(fields[i].text, separator);
       const bool word =
           std::isnan(value) && !fields[i].text.empty() && !parse_decimal(fields[i].text, separator);
-      (word ? bad : good)[i] += 1;
-      if (word && example[i] == nullptr) example[i] = &fields[i];
+      if (word) words.push_back({r - head.rows, i, &fields[i]});
       table.values.push_back(value);
     }
   }
@@ -312,14 +321,7 @@ Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file
     return text_error(file, rows.back().end, "a header without rows", "a row a measurement",
                       "check that the log was written");
   }
-  for (std::size_t i = 0; i < bad.size(); ++i) {
-    // A column of numbers with a slip in it is no column of words.
-    if (bad[i] == 0 || good[i] < 20 * bad[i]) continue;
-    return text_error(
-        file, example[i]->place,
-        "column " + quoted_word(table.columns[i]) + " " + quoted_word(example[i]->text),
-        "a number, as in its other rows", "correct it or leave it empty");
-  }
+  blank_slips(words, file, &table, mistakes);
   const std::string& first = table.columns.front();
   std::string format = "a table with a header";
   if (first == "%time") format = "rostopic echo -p";
@@ -335,49 +337,20 @@ bool looks_like_tum(std::string_view text) {
   }
   const std::string_view line = first_line(text);
   if (line.find(',') != line.npos) return false;
-  const auto tokens = tokens_of(line);
+  const auto tokens = words_of(line);
   return tokens.size() == 8 && std::ranges::all_of(tokens, [](std::string_view word) {
            return parse_double(word).has_value();
          });
 }
 
-// Columns between blanks alone, as Octave and NumPy write them, by commas: a '#' or '%' before a
-// header of names is no name, and other lines of comments are blank.  Empty: they are not such.
-std::string with_commas(std::string_view text) {
-  std::string out;
-  bool numbers = false;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    std::string_view line = text.substr(at, end - at);
-    at = end + 1;
-    if (line.find_first_of(",;\"\t") != line.npos) return "";
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    std::vector<std::string_view> tokens = tokens_of(line);
-    if (!tokens.empty() && (tokens[0][0] == '#' || tokens[0][0] == '%')) {
-      tokens[0].remove_prefix(1);
-      if (tokens[0].empty()) tokens.erase(tokens.begin());
-      if (out.find_first_not_of('\n') != out.npos) tokens.clear();
-    }
-    if (tokens.size() == 1) return "";
-    for (std::size_t i = 0; i < tokens.size(); ++i) {
-      numbers = numbers || parse_double(tokens[i]);
-      out += (i == 0 ? "" : ",") + std::string(tokens[i]);
-    }
-    out += '\n';
-  }
-  return numbers ? out : "";
-}
-
-}  // namespace
-
-Result<Recording> parse_text_log(std::string_view text, const std::string& file) {
+Result<Recording> parse_form(std::string_view text, const std::string& file, Mistakes& mistakes) {
   const TextFormat format = sniff_format(text);
   const bool other = format == TextFormat::kEmpty || format == TextFormat::kHtml ||
                      format == TextFormat::kJson || format == TextFormat::kUtf16 ||
                      format == TextFormat::kBinary || format == TextFormat::kRunStore;
   if (other) return wrong_format(file, format, "a log of drives");
-  if (looks_like_tum(text)) return parse_tum(text, file);
-  const std::string commas = with_commas(text);
+  if (looks_like_tum(text)) return parse_tum(text, file, mistakes);
+  const std::string commas = blanks_to_commas(text);
   if (!commas.empty()) text = commas;
   const char separator = find_separator(text);
   ASSIGN_OR_RETURN(auto rows, parse_separated(text, file, separator));
@@ -393,8 +366,27 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
   const bool headed = std::ranges::none_of(first.fields, [&](const CsvField& f) {
     return parse_decimal(f.text, separator).has_value();
   });
-  return headed ? parse_headed(std::move(rows), file, separator)
-                : parse_echo(rows, file, separator);
+  return headed ? parse_headed(std::move(rows), file, separator, mistakes)
+                : parse_echo(std::move(rows), file, separator, mistakes);
+}
+
+}  // namespace
+
+Result<Recording> parse_text_log(std::string_view text, const std::string& file,
+                                 bool skip_invalid) {
+  Mistakes mistakes(skip_invalid);
+  auto recording = parse_form(text, file, mistakes);
+  const std::size_t bad = mistakes.omitted();
+  const std::size_t all = recording ? recording->tables.front().rows() : bad;
+  if (2 * bad > all) {
+    mistakes.add_file(text_error(file, {}, "mistakes in " + std::to_string(bad) + " of its rows",
+                                 "few among " + std::to_string(all), "export it again"));
+  }
+  RETURN_IF_ERROR(mistakes.status());
+  if (recording) {
+    for (std::string& note : mistakes.notes()) recording->notes.push_back(std::move(note));
+  }
+  return recording;
 }
 
 }  // namespace gapfarm

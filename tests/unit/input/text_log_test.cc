@@ -12,6 +12,7 @@
 
 namespace gapfarm::text_log_test {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -203,6 +204,28 @@ TEST(TextLogs, ErrorsReportWhatAndWhere) {
   EXPECT_THAT(error_of(slip + "41,1.0.0\n"), StartsWith("f.csv:42:4: found column 'x' '1.0.0'"));
   const Read none = read({"a,b\n1,2\n"});
   EXPECT_TRUE(none.map.poses.columns.empty());
+}
+
+TEST(TextLogs, RowsWithMistakesAreOmittedWhereThatIsWanted) {
+  const std::string text = "t,x,y,theta,v,omega\n0,0,0,0,1,0\n0.1,0,0\n";
+  std::string log = text;
+  for (int i = 2; i < 60; ++i) log += "0." + std::to_string(i + 10) + ",1,0,0,1,0\n";
+  log.replace(log.rfind(",1,0,0,"), 3, ",abc,");
+  EXPECT_THAT(error_of(log),
+              AllOf(StartsWith("f.csv:3:8: found 3 fields"),
+                    HasSubstr("f.csv:61:6: found column 'x' 'abc'"), HasSubstr("--skip-invalid")));
+  const auto recording = parse_text_log(log, "f.csv", true);
+  ASSERT_TRUE(recording) << recording.error().message;
+  const auto runs = to_runs({*recording}, guess_map({*recording}));
+  ASSERT_TRUE(runs) << runs.error().message;
+  EXPECT_EQ(runs->log.runs[0].poses.size(), 58u);
+  EXPECT_THAT(runs->report, Contains(StartsWith("omitted: f.csv:3:8: found 3 fields")));
+  EXPECT_THAT(runs->report, Contains(StartsWith("omitted: f.csv:61:6: found column 'x' 'abc'")));
+  const auto most = parse_text_log(text + "0.2,0\n", "f.csv", true);
+  ASSERT_FALSE(most);
+  EXPECT_THAT(most.error().message, HasSubstr("mistakes in 2 of its rows"));
+  const std::string tum = "0 0 0 0 0 0 0 1\n1 0 0\n2 0 0 0 0 0 0 1\n";
+  EXPECT_EQ(parse_text_log(tum, "f.txt", true)->tables[0].rows(), 3u);
 }
 
 TEST(LogMaps, ReadBackAndNameMistakes) {
