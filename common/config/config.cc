@@ -34,7 +34,7 @@ void read_top(TomlSection& top, Config& config) {
 }
 
 // [robot].  False when there is no robot to go on with.
-bool read_robot_section(TomlSection& top, Config& config) {
+bool read_robot_section(TomlSection& top, const Problem* known, Config& config) {
   const ScenarioForm& form = scenario_form(config.problem.scenario);
   auto section = top.section("robot");
   if (!section && !form.robot) return true;
@@ -47,10 +47,10 @@ bool read_robot_section(TomlSection& top, Config& config) {
   section->read("file", file);
   section->finish();
   const std::string path = beside(config.path, file);
-  const auto text = read_text_file(path);
-  const Status known = text ? config.problem.set_robot(*text, path) : Status(text.error());
-  if (!known) {
-    top.errors().add(section->table().source().begin, known.error().message);
+  const auto text = known ? Result<std::string>(known->robot_file) : read_text_file(path);
+  const Status set = text ? config.problem.set_robot(*text, path) : Status(text.error());
+  if (!set) {
+    top.errors().add(section->table().source().begin, set.error().message);
     return false;
   }
   config.robot_path = path;
@@ -86,6 +86,10 @@ void search_everything(const ParameterTable& table, std::vector<Gene>& genes) {
   }
 }
 
+// `known`: none, or whose robot and program these are.
+Result<Config> parse(std::string_view text, const std::string& path, const ProgramStarter& start,
+                     const Problem* known);
+
 }  // namespace
 
 Result<std::string> start_no_program(const ExternalCommand& command) {
@@ -98,6 +102,25 @@ Result<std::string> start_program(const ExternalCommand& command) {
 
 Result<Config> parse_config(std::string_view text, const std::string& path,
                             const ProgramStarter& start) {
+  return parse(text, path, start, nullptr);
+}
+
+Result<Config> parse_config_of(const Problem& known, std::string_view text,
+                               const std::string& path) {
+  return parse(text, path, start_no_program, &known);
+}
+
+Result<Config> read_config(const std::string& path) {
+  const std::string file = shipped_file(path);
+  auto text = read_text_file(file);
+  if (!text.ok()) return text.error();
+  return parse_config(*text, file, start_program);
+}
+
+namespace {
+
+Result<Config> parse(std::string_view text, const std::string& path, const ProgramStarter& start,
+                     const Problem* known) {
   auto parsed = parse_toml(text, path);
   if (!parsed.ok()) {
     const TextFormat format = sniff_format(text);
@@ -116,9 +139,10 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   read_top(top, config);
   Problem& problem = config.problem;
   const ScenarioForm& form = scenario_form(problem.scenario);
-  if ((form.robot || form.other_robot) && !read_robot_section(top, config)) return errors.error();
+  if ((form.robot || form.other_robot) && !read_robot_section(top, known, config))
+    return errors.error();
   if (form.windows) read_runs_section(top, config);
-  if (form.program && !read_external_section(top, config.path, start, problem)) {
+  if (form.program && !read_external_section(top, config.path, start, known, problem)) {
     return errors.error();
   }
   const ParameterTable& table = problem.table();
@@ -148,12 +172,7 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   return config;
 }
 
-Result<Config> read_config(const std::string& path) {
-  const std::string file = shipped_file(path);
-  auto text = read_text_file(file);
-  if (!text.ok()) return text.error();
-  return parse_config(*text, file, start_program);
-}
+}  // namespace
 
 Status check_moves(const std::string& scenario, const std::string& path) {
   if (!scenario_form(scenario).objective) return {};

@@ -22,6 +22,10 @@ Result<std::string> start_program(const ExternalCommand& command);
 // itself.
 Result<Config> parse_config(std::string_view text, const std::string& path,
                             const ProgramStarter& start = start_no_program);
+// The same where the problem is known: robot and program are its own, no robot's file is read and
+// nothing is started.
+Result<Config> parse_config_of(const Problem& known, std::string_view text,
+                               const std::string& path);
 // Looks among the shipped ones too (shipped_file).
 Result<Config> read_config(const std::string& path);
 

@@ -114,7 +114,7 @@ void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettin
 }
 
 bool read_external_section(TomlSection& top, const std::string& config_path,
-                           const ProgramStarter& start, Problem& problem) {
+                           const ProgramStarter& start, const Problem* known, Problem& problem) {
   const std::string& scenario = problem.scenario;
   const bool objective = scenario_form(scenario).objective;
   const std::string example =
@@ -137,6 +137,10 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
   section->finish();
   if (command.argv.empty() || command.argv[0].empty()) {
     return fail("[" + name + "] program names no program, expected words such as " + example);
+  }
+  if (known != nullptr) {
+    problem.external = known->external;
+    return true;
   }
   std::error_code ignored;
   command.folder =

@@ -10,7 +10,7 @@ namespace gapfarm {
 
 // [external] or [objective].  False when there is no program to go on with.
 bool read_external_section(TomlSection& top, const std::string& config_path,
-                           const ProgramStarter& start, Problem& problem);
+                           const ProgramStarter& start, const Problem* known, Problem& problem);
 
 // direction and noisy of [objective], in configs and models.
 void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettings& spread);

@@ -84,6 +84,13 @@ Status put_in_place(const std::string& temporary, const std::string& path, IfThe
 
 }  // namespace
 
+std::string path_from(const std::string& folder, const std::string& path) {
+  std::error_code ignored;
+  const std::filesystem::path there = (std::filesystem::path(folder) / path).lexically_normal();
+  const bool here = std::filesystem::absolute(path, ignored).lexically_normal() == there;
+  return !here && std::filesystem::exists(there, ignored) ? there.string() : path;
+}
+
 Status write_file_atomically(const std::string& given, std::string_view bytes, IfThere if_there) {
   std::error_code code;
   // Through a link, so that the link stays one.

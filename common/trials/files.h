@@ -11,6 +11,10 @@ namespace gapfarm {
 // The bytes of a file.  Errors name the path and say whether it is missing, a folder or unreadable.
 Result<std::string> read_text_file(const std::string& path);
 
+// `path` as a command that was called in `folder` meant it: below that where it is relative and
+// there is such a file, as it stands otherwise, or where that is the same.
+std::string path_from(const std::string& folder, const std::string& path);
+
 // What becomes of a file in the way: replaced, or kept.  Kept, the new one stays beside it, under a
 // name that the error shows.
 enum class IfThere { kReplace, kKeep };

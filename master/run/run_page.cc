@@ -272,11 +272,10 @@ Result<std::optional<Problem>> held_out_of(const RunInfo& info, const Problem& p
   config.text = info.config_text;
   config.problem = problem;
   if (problem.windows()) {
-    ASSIGN_OR_RETURN(const auto read,
-                     parse_config(info.config_text, info.config_path, start_no_program));
+    ASSIGN_OR_RETURN(const auto read, parse_stored(info, problem));
+    config.path = read.path;
     config.windows = read.windows;
     config.trial_files = read.trial_files;
-    take_stored_files(info, &config);
   }
   ASSIGN_OR_RETURN(const auto plan, read_stages(config));
   return read_validation(plan, config);

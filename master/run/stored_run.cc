@@ -1,5 +1,6 @@
 #include "master/run/stored_run.h"
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
@@ -9,6 +10,7 @@
 #include "common/config/stages.h"
 #include "common/json/json.h"
 #include "common/problem/problem.h"
+#include "common/trials/files.h"
 #include "master/evolve/optimisers.h"
 
 namespace gapfarm {
@@ -32,6 +34,9 @@ void each(Visit visit) {
 constexpr const char* kDefaultKind = "optimiser";
 // And the log's files, which the config may not name.
 constexpr const char* kTrialFiles = "trials";
+
+// Among the overrides, too: the folder in which the run's command was called.
+constexpr const char* kFolder = "folder";
 
 Json start_json(const SearchStart& start) {
   Json json = {{"from", start.from}, {"genomes", start.genomes}};
@@ -79,6 +84,8 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
         optimisers()[static_cast<std::size_t>(config.evolution.optimiser.kind)].name;
   }
   if (!config.trial_files.empty()) changes[kTrialFiles] = config.trial_files;
+  std::error_code ignored;
+  changes[kFolder] = std::filesystem::current_path(ignored).string();
   const SearchStart& start = config.evolution.start;
   if (!start.genomes.empty()) changes["start"] = start_json(start);
   info.overrides = json_text(changes);
@@ -107,21 +114,26 @@ Result<Problem> stored_problem(const RunReader& run) {
   return error;
 }
 
-void take_stored_files(const RunInfo& info, Config* config) {
-  const Json json = parse_json(info.overrides);
-  if (!json.is_object() || !json.value(kTrialFiles, Json()).is_array()) return;
-  config->trial_files.clear();
-  for (const Json& file : json[kTrialFiles]) {
-    if (file.is_string()) config->trial_files.push_back(file.get<std::string>());
+Result<Config> parse_stored(const RunInfo& info, const Problem& problem) {
+  const Json all = parse_json(info.overrides);
+  const bool has = all.is_object() && all.contains(kFolder) && all[kFolder].is_string();
+  const std::string folder = has ? all[kFolder].get<std::string>() : "";
+  const auto seen = [&](const std::string& path) { return has ? path_from(folder, path) : path; };
+  ASSIGN_OR_RETURN(Config config,
+                   parse_config_of(problem, info.config_text, seen(info.config_path)));
+  if (!all.is_object() || !all.value(kTrialFiles, Json()).is_array()) return config;
+  config.trial_files.clear();
+  for (const Json& file : all[kTrialFiles]) {
+    if (file.is_string()) config.trial_files.push_back(seen(file.get<std::string>()));
   }
+  return config;
 }
 
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
-  Result<Config> config = parse_config(info.config_text, info.config_path, start_program);
-  if (!config) return config.error();
   ASSIGN_OR_RETURN(Problem problem, stored_problem(info));
+  Result<Config> config = parse_stored(info, problem);
+  if (!config) return config.error();
   config->problem = std::move(problem);
-  take_stored_files(info, &*config);
   config->seed = info.seed;
   if (default_optimiser(info.config_text) && !parse_json(info.overrides).contains(kDefaultKind)) {
     config->evolution.optimiser.kind = OptimiserKind::kGenetic;
@@ -149,8 +161,7 @@ Result<Model> model_of_member(const RunReader& run, const StoredIndividual& memb
   Model model = model_of_problem(problem, problem.values_of(member.genome));
   model.score = member.fitness;
   model.data = {run.info().problem_hash, problem.log.trials.size(), {}};
-  if (auto config = parse_config(run.info().config_text, run.info().config_path, start_program)) {
-    take_stored_files(run.info(), &*config);
+  if (const auto config = parse_stored(run.info(), problem)) {
     model.data.files = config->trial_files;
   }
   model.origin = {name, run.info().seed, generation, evaluations};

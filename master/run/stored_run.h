@@ -33,8 +33,9 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides);
 Result<Problem> stored_problem(const RunInfo& info);
 Result<Problem> stored_problem(const RunReader& run);  // the error names the run
 
-// The files that the run's log was read from; those of the config where the store has none.
-void take_stored_files(const RunInfo& info, Config* config);
+// The config's text, about the stored problem; its files, or those that the run's log was read from
+// in their place, as seen from where the run began, wherever this is called.
+Result<Config> parse_stored(const RunInfo& info, const Problem& problem);
 
 // The run's config and problem, with its overrides and then these.
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides);

@@ -1,11 +1,7 @@
 // Commands about a ground robot's runs, on two short drives straight ahead.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
-#include <string>
-
-#include "tests/integration/run_program.h"
+#include "tests/integration/program_runs.h"
 
 namespace gapfarm::ground_commands_test {
 
@@ -14,7 +10,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class GroundCommands : public ::testing::Test {
+class GroundCommands : public ProgramRuns {
  protected:
   // A folder of runs "1", "2", ...: each commanded 0.2 m/s for 4 s, and gone at `speeds`.
   void write_runs(const std::string& name, const std::vector<double>& speeds) const {
@@ -39,7 +35,6 @@ class GroundCommands : public ::testing::Test {
 
   GroundCommands() { write_runs("monday", {0.2, 0.15}); }
 
-  const TemporaryFolder folder_;
   const std::string robot_ =
       folder_.write("robot.toml",
                     "drive = \"differential\"\ncommands = [\"v\", \"omega\"]\n"
@@ -64,6 +59,26 @@ TEST_F(GroundCommands, TheMedianOfTwoEndsIsTheirMean) {
                        folder_ / "out", "--json"});
   ASSERT_EQ(exported.exit_code, 0) << exported.err;
   EXPECT_NEAR(json::parse(exported.out)["simulated_m"], (0 + 4 * 0.05) / 2, 0.01);
+}
+
+TEST_F(GroundCommands, ARunAndADiagnosisGoOnFromAnyFolder) {
+  config(
+      "[runs]\nfolders = [\"monday\"]\n[genes]\nwheels.left.radius = \"table\"\n"
+      "[evolution]\npopulation = 4\n");
+  const Finished begun = shell(
+      "\"$G\" evolve car.toml --out run --generations 1 --workers 1 && mkdir elsewhere && "
+      "\"$G\" diagnose car.toml --out found --workers 1");
+  ASSERT_EQ(begun.exit_code, 0) << begun.err;
+  const Finished resumed = shell(
+      "cd elsewhere && \"$G\" resume ../run --generations 2 --workers 1 && "
+      "\"$G\" export runs ../run --out paths && \"$G\" export ranges ../found --out ranges");
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(status("run")["generation"], 2);
+  EXPECT_THAT(resumed.err, Not(HasSubstr("has changed")));
+  folder_.write("robot.toml", text_of(robot_) + "# another\n");
+  const Finished changed = shell("\"$G\" resume run --generations 3 --workers 1");
+  EXPECT_EQ(changed.exit_code, 0) << changed.err;
+  EXPECT_THAT(changed.err, HasSubstr("robot.toml has changed since the run began"));
 }
 
 }  // namespace gapfarm::ground_commands_test

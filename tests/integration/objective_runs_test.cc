@@ -104,6 +104,15 @@ TEST_F(ObjectiveRuns, NumberOfWorkersAndKillsChangeNothing) {
   EXPECT_EQ(status("killed")["digest"], status("one")["digest"]);
 }
 
+TEST_F(ObjectiveRuns, ResumeFromAnyFolder) {
+  config("");
+  const Finished resumed = shell(
+      "\"$G\" evolve run.toml --out run --generations 1 --workers 1 && mkdir elsewhere && "
+      "cd elsewhere && \"$G\" resume ../run --generations 2 --workers 1");
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(status("run")["generation"], 2);
+}
+
 TEST_F(ObjectiveRuns, WhatCrashesHangsOrPrintsRubbishIsNamedAndTheRunGoesOn) {
   const struct {
     const char *name, *misbehave, *named;

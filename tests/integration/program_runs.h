@@ -17,6 +17,11 @@ class ProgramRuns : public ::testing::Test {
     return gapfarm_command({"evolve", config, "--out", folder_ / run, "--generations", generations,
                             "--workers", workers});
   }
+  // A script in the folder; $G is gapfarm.
+  Finished shell(const std::string& script) const {
+    return run_program("/bin/sh", {"-c", "cd \"$D\" && " + script},
+                       {"G=" GAPFARM_BIN_DIR "/gapfarm", "D=" + folder_.path().string()});
+  }
   std::string screen(const std::string& run) const {
     return gapfarm_command({"status", folder_ / run}).out;
   }

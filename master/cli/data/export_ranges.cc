@@ -33,7 +33,10 @@ Result<Ranges> read_ranges(const std::string& source, Console& console) {
   }
   GroundSource ground;
   if (values) {
-    ground = {values->given, values->logs, {}};
+    ground.robot = values->given;
+    for (const std::string& log : values->logs) {
+      ground.logs.push_back(path_from(values->folder, log));
+    }
   } else {
     ASSIGN_OR_RETURN(ground, read_ground_source(source, console));
   }

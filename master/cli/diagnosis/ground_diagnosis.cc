@@ -112,7 +112,8 @@ Result<int> run_diagnose_runs(DiagnoseCommand& command, const Config& config,
     options.memo = &*fits;
     ASSIGN_OR_RETURN(result, diagnose_ground(robot, runs, options));
     files = {{"robot.toml", format_robot(result->corrected)},
-             {"values.json", format_values({robot, config.trial_files, result->values})}};
+             {"values.json", format_values({robot, config.trial_files, result->values,
+                                            std::filesystem::current_path().string()})}};
     left = "robot.toml with what was named put in; next: gapfarm export ros " + command.out;
   } else {
     ASSIGN_OR_RETURN(const auto farm, start_recorded(command.farm, config.farm, context));

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
+#include "common/trials/files.h"
 #include "master/cli/evolution/evolution.h"
 #include "master/cli/evolution/search_start.h"
 #include "master/cli/subcommand.h"
@@ -23,11 +24,22 @@ struct ResumeCommand {
   EvolutionOptions options;
 };
 
+// A run goes on with the robot that it began with.
+void note_changed_robot(const Config& config, Console& console) {
+  if (config.robot_path.empty()) return;
+  const auto text = read_text_file(config.robot_path);
+  if (!text || *text == config.problem.robot_file) return;
+  console.note(config.robot_path +
+               " has changed since the run began, which goes on with the robot as it was; "
+               "`gapfarm evolve` takes the file as it is");
+}
+
 // By its reader: a store of an older version stays as it is.
 Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
   ASSIGN_OR_RETURN(const auto generations, reader.generations());
   ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
+  note_changed_robot(config, context.console);
   const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
   const std::uint64_t from = std::min(command.branch.generation.value_or(last), last);
   return print_dry_run(
@@ -44,6 +56,7 @@ Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
   EvolutionOverrides overrides = EvolutionOverrides::from_json(reader.info().overrides);
   overrides.merge(command.options.overrides);
   ASSIGN_OR_RETURN(Config config, stored_config(reader.info(), overrides));
+  note_changed_robot(config, context.console);
   RETURN_IF_ERROR(branch_off(reader, command.branch, config));
   RETURN_IF_ERROR(check_runnable(config));
   RETURN_IF_ERROR(check_farm(command.options.farm, config.farm));
@@ -78,6 +91,7 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
   context.begun = true;
   const Result<Config> config = stored_config(store.info(), command.options.overrides);
   if (!config) return stopped_by(store, {command.run + ": " + config.error().message});
+  note_changed_robot(*config, context.console);
   if (command.branch.generation) {
     const auto kept = store.truncate_after(*command.branch.generation);
     if (!kept) return stopped_by(store, kept.error());

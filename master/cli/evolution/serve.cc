@@ -203,7 +203,7 @@ std::string title_of(const Trial& trial, std::size_t number, bool window) {
 std::vector<PathSample> logged_window(const RunInfo& info, const Problem& problem,
                                       const Trial& window, bool apart) {
   Config config;
-  if (auto read = parse_config(info.config_text, info.config_path, start_no_program)) {
+  if (auto read = parse_stored(info, problem)) {
     config = *std::move(read);
   }
   std::vector<std::string> folders = config.trial_files;

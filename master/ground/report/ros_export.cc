@@ -236,7 +236,8 @@ nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values, con
 }
 
 std::string format_values(const ReportedValues& values) {
-  const Json json = {{"logs", values.logs},
+  const Json json = {{"folder", values.folder},
+                     {"logs", values.logs},
                      {"values", values_json(values.values)},
                      {"robot", format_robot(values.given)}};
   return json_text(json, 2) + "\n";
@@ -250,6 +251,7 @@ Result<ReportedValues> parse_values(const std::string& text, const std::string& 
     const LenientFields fields(json);
     fields.field("robot", robot);
     fields.field("logs", values.logs);
+    fields.field("folder", values.folder);
     fields.list("values", values.values, describe_value("name", "named"));
   }
   const bool whole = json.contains("values") && values.values.size() == json["values"].size() &&

@@ -32,6 +32,7 @@ struct ReportedValues {
   GroundRobot given;              // the robot as its file has it
   std::vector<std::string> logs;  // folders
   std::vector<ReportedValue> values;
+  std::string folder = {};  // in which the diagnosis was called; `logs` are as named there
 };
 
 // A list of {name, had, says, lo, hi, named}; the first and the last by these words.
