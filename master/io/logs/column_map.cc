@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -19,30 +20,56 @@
 namespace gapfarm {
 namespace {
 
+enum class UnitKind { kTime, kLength, kAngle, kSpeed, kTurning, kShare };
+
 struct Unit {
   const char* name;
   double factor;
+  UnitKind kind;
 };
 
-constexpr Unit kUnits[] = {{"s", 1},
-                           {"ms", 1e-3},
-                           {"us", 1e-6},
-                           {"ns", 1e-9},
-                           {"m", 1},
-                           {"cm", 1e-2},
-                           {"mm", 1e-3},
-                           {"rad", 1},
-                           {"mrad", 1e-3},
-                           {"deg", kDegree},
-                           {"m/s", 1},
-                           {"cm/s", 1e-2},
-                           {"mm/s", 1e-3},
-                           {"km/h", 1 / 3.6},
-                           {"rad/s", 1},
-                           {"deg/s", kDegree},
-                           {"rpm", std::numbers::pi / 30},
-                           {"%", 1e-2},
-                           {"1", 1}};
+constexpr Unit kUnits[] = {{"s", 1, UnitKind::kTime},
+                           {"ms", 1e-3, UnitKind::kTime},
+                           {"us", 1e-6, UnitKind::kTime},
+                           {"ns", 1e-9, UnitKind::kTime},
+                           {"m", 1, UnitKind::kLength},
+                           {"cm", 1e-2, UnitKind::kLength},
+                           {"mm", 1e-3, UnitKind::kLength},
+                           {"rad", 1, UnitKind::kAngle},
+                           {"mrad", 1e-3, UnitKind::kAngle},
+                           {"deg", kDegree, UnitKind::kAngle},
+                           {"m/s", 1, UnitKind::kSpeed},
+                           {"cm/s", 1e-2, UnitKind::kSpeed},
+                           {"mm/s", 1e-3, UnitKind::kSpeed},
+                           {"km/h", 1 / 3.6, UnitKind::kSpeed},
+                           {"rad/s", 1, UnitKind::kTurning},
+                           {"deg/s", kDegree, UnitKind::kTurning},
+                           {"rpm", std::numbers::pi / 30, UnitKind::kTurning},
+                           {"%", 1e-2, UnitKind::kShare},
+                           {"1", 1, UnitKind::kShare}};
+
+// Of a column of such a table; none: a channel may be anything.
+std::optional<UnitKind> kind_of(std::string_view table, const MappedColumn& c) {
+  if (c.role == "t" || c.role == "dt") return UnitKind::kTime;
+  const bool poses = table == "poses", counted = c.rate || c.increment;
+  if (poses && (c.role == "x" || c.role == "y" || c.role == "z")) return UnitKind::kLength;
+  if (poses && c.role == "theta") return UnitKind::kAngle;
+  if (!poses && (c.role == "v" || c.role == "vy")) {
+    return counted ? UnitKind::kLength : UnitKind::kSpeed;
+  }
+  if (!poses && (c.role == "omega" || c.role == "yaw_rate")) {
+    return counted ? UnitKind::kAngle : UnitKind::kTurning;
+  }
+  return {};
+}
+
+std::string units_of(UnitKind kind) {
+  std::string names;
+  for (const Unit& unit : kUnits) {
+    if (unit.kind == kind) names += (names.empty() ? "" : ", ") + std::string(unit.name);
+  }
+  return names;
+}
 
 struct ColumnNumber {
   const char* key;
@@ -118,7 +145,7 @@ class MapReader {
     for (const auto& [key, node] : section->table()) {
       const std::string role(key.str());
       if (kOptions.count(role) != 0) continue;
-      read_column(*section, role, node, map);
+      read_column(*section, name, role, node, map);
     }
     // TOML's tables are sorted by name; channels keep the file's order.
     std::ranges::sort(places_);
@@ -183,8 +210,8 @@ class MapReader {
     }
   }
 
-  void read_column(TomlSection& section, const std::string& role, const toml::node& node,
-                   TableMap& map) {
+  void read_column(TomlSection& section, const char* name, const std::string& role,
+                   const toml::node& node, TableMap& map) {
     MappedColumn column{role, "", ""};
     if (const auto* word = node.as_string()) {
       section.find(role);
@@ -209,6 +236,12 @@ class MapReader {
       if (!column.unit.empty() && unit_factor(column.unit) == 0) {
         inner->fail("unit", "unknown unit " + quoted_word(column.unit) +
                                 suggestion(column.unit, known_units()));
+      } else if (const auto kind = kind_of(name, column); kind && !column.unit.empty()) {
+        const Unit* unit = find_by(kUnits, column.unit, &Unit::name);
+        if (unit->kind != *kind && column.unit != "1") {
+          inner->fail("unit", "found unit " + quoted_word(column.unit) + " of " + role +
+                                  ", expected one of " + units_of(*kind));
+        }
       }
     }
     if (column.column.empty()) {

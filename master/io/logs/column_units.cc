@@ -4,7 +4,9 @@
 #include <cmath>
 #include <string>
 
+#include "common/base/ranges.h"
 #include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -25,6 +27,14 @@ Result<std::string> unit_of(const LogTable& table, const MappedColumn& c) {
                         role + "unit = \"...\" }");
 }
 
+bool has_number(const LogTable& table, const std::string& column) {
+  const std::size_t at = *table.find(column);
+  for (std::size_t r = 0; r < table.rows(); ++r) {
+    if (std::isfinite(table.at(r, at))) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Result<SiLine> si_line(const LogTable& table, const TableMap& map, const MappedColumn& c,
@@ -42,6 +52,42 @@ Result<SiLine> si_line(const LogTable& table, const TableMap& map, const MappedC
   }
   if (rim) factor /= map.wheel_radius_m;
   return SiLine{c.sign * c.scale / c.gear * factor, c.offset * factor};
+}
+
+bool has_all(const LogTable& table, const TableMap& map) {
+  return std::ranges::all_of(
+      map.columns, [&](const MappedColumn& c) { return table.find(c.column).has_value(); });
+}
+
+Error no_rows(const std::vector<Recording>& recordings, const TableMap& map,
+              const std::string& kind) {
+  std::string there;
+  std::vector<std::string> columns;
+  for (const Recording& recording : recordings) {
+    for (const LogTable& table : recording.tables) {
+      columns.insert(columns.end(), table.columns.begin(), table.columns.end());
+      columns.insert(columns.end(), table.titles.begin(), table.titles.end());
+      for (const MappedColumn& c : map.columns) {
+        if (!has_all(table, map) || has_number(table, c.column)) continue;
+        return Error{table.source + ":1: found no number in column " + quoted_word(c.column) +
+                     ", expected " + c.role + " of the " + kind +
+                     (c.role == "t" ? " as seconds, or as 2026-01-31T12:00:00.5Z" : "")};
+      }
+      if (there.size() > 600) continue;
+      there += (there.empty() ? "" : "; ") + table.source + ": " + joined(table.columns, ", ");
+    }
+  }
+  for (const MappedColumn& c : map.columns) {
+    if (contains(columns, c.column)) continue;
+    const std::string near = nearest_word(c.column, columns);
+    return Error{
+        recordings.front().file + ":1: found no column " + quoted_word(c.column) +
+        " in any table, expected it as " + c.role + " of [" + kind + "]" +
+        (near.empty() ? "; there is " + there : "; did you mean " + quoted_word(near) + "?")};
+  }
+  return Error{recordings.front().file + ":1: found no " + kind +
+               " in any table, expected the columns of [" + kind + "] of the map" +
+               (map.source.empty() ? "" : " in " + map.source) + "; there is " + there};
 }
 
 double counted_on(double wraps, double before, double count) {

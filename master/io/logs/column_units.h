@@ -1,6 +1,9 @@
 // What a recording's column is in SI.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "common/base/result.h"
 #include "master/io/logs/column_map.h"
 #include "master/io/logs/log_table.h"
@@ -16,6 +19,12 @@ struct SiLine {
 // the wheels' radius.
 Result<SiLine> si_line(const LogTable& table, const TableMap& map, const MappedColumn& c,
                        bool poses);
+
+bool has_all(const LogTable& table, const TableMap& map);
+
+// Why no table gave rows of a kind ("poses"): a column without a number, or one that no table has.
+Error no_rows(const std::vector<Recording>& recordings, const TableMap& map,
+              const std::string& kind);
 
 // What a counter that begins anew at `wraps` (0: never) would count by now without that, having
 // counted to `before`; NaN: nothing yet.  REQUIRES: fewer than half of them a row.

@@ -57,7 +57,8 @@ class Importer {
     }
     for (const Kind& kind : {kinds()[0], kinds()[1]}) {
       const Tally& tally = tallies_[kind.name];
-      if (!kind.map->columns.empty() && tally.taken == 0) return none_found(kind);
+      if (!kind.map->columns.empty() && tally.taken == 0)
+        return no_rows(recordings_, *kind.map, kind.name);
       if (tally.back > tally.taken) return out_of_order(kind, tally);
     }
     assemble();
@@ -83,39 +84,6 @@ class Importer {
             {"commands", &map_.commands},
             {"wheels", &map_.wheels},
             {"gyro", &map_.gyro}};
-  }
-
-  static bool has_all(const LogTable& table, const TableMap& map) {
-    return std::ranges::all_of(
-        map.columns, [&](const MappedColumn& c) { return table.find(c.column).has_value(); });
-  }
-
-  static bool has_number(const LogTable& table, const std::string& column) {
-    const std::size_t at = *table.find(column);
-    for (std::size_t r = 0; r < table.rows(); ++r) {
-      if (std::isfinite(table.at(r, at))) return true;
-    }
-    return false;
-  }
-
-  Error none_found(const Kind& kind) const {
-    std::string there;
-    for (const Recording& recording : recordings_) {
-      for (const LogTable& table : recording.tables) {
-        for (const MappedColumn& c : kind.map->columns) {
-          if (!has_all(table, *kind.map) || has_number(table, c.column)) continue;
-          return Error{table.source + ":1: found no number in column " + quoted_word(c.column) +
-                       ", expected " + c.role + " of the " + kind.name +
-                       (c.role == "t" ? " as seconds, or as 2026-01-31T12:00:00.5Z" : "")};
-        }
-        if (there.size() > 600) break;
-        there += (there.empty() ? "" : "; ") + table.source + ": " + joined(table.columns, ", ");
-      }
-    }
-    return Error{recordings_.front().file + ":1: found no " + kind.name +
-                 " in any table, expected the columns of [" + kind.name + "] of the map" +
-                 (kind.map->source.empty() ? "" : " in " + kind.map->source) + "; there is " +
-                 there};
   }
 
   Status take(std::size_t recording, const Kind& kind) {

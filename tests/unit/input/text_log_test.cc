@@ -228,6 +228,30 @@ TEST(TextLogs, RowsWithMistakesAreOmittedWhereThatIsWanted) {
   EXPECT_EQ(parse_text_log(tum, "f.txt", true)->tables[0].rows(), 3u);
 }
 
+TEST(LogMaps, UnitsAreOfTheColumnsKind) {
+  const std::string poses = "[poses]\nt = \"t\"\nx = \"x\"\ny = \"y\"\n";
+  const auto wrong = parse_map(poses + "theta = { column = \"yaw\", unit = \"mm\" }\n", "m.toml");
+  ASSERT_FALSE(wrong);
+  EXPECT_THAT(wrong.error().message,
+              AllOf(StartsWith("m.toml:5:"),
+                    HasSubstr("unit 'mm' of theta, expected one of rad, mrad, deg")));
+  const std::string drive = poses + "theta = \"yaw\"\n[commands]\nt = \"t\"\n";
+  EXPECT_FALSE(parse_map(drive + "v = { column = \"v\", unit = \"rpm\" }\n", "m.toml"));
+  EXPECT_TRUE(parse_map(drive + "v = { column = \"v\", unit = \"km/h\" }\n", "m.toml"));
+  EXPECT_TRUE(parse_map(drive + "left = { column = \"v\", unit = \"%\" }\n", "m.toml"));
+}
+
+TEST(LogMaps, AColumnThatNoTableHasIsNamed) {
+  const auto map =
+      parse_map("[poses]\nt = \"t\"\nx = \"x_mn\"\ny = \"y_mm\"\ntheta = \"yaw\"\n", "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  const auto runs = to_runs({*parse_text_log("t,x_mm,y_mm,yaw\n0,1,2,3\n", "f.csv")}, *map);
+  ASSERT_FALSE(runs);
+  EXPECT_THAT(runs.error().message,
+              AllOf(StartsWith("f.csv:1: found no column 'x_mn' in any table"),
+                    HasSubstr("x of [poses]; did you mean 'x_mm'?")));
+}
+
 TEST(LogMaps, ReadBackAndNameMistakes) {
   const std::string text =
       "[poses]\nsource = \"/odom\"\nup = \"y\"\nt = { column = \"a \\\"b\\\"\", unit = \"ns\" }\n"
