@@ -12,16 +12,18 @@ using ::testing::Not;
 
 class GroundCommands : public ProgramRuns {
  protected:
-  // A folder of runs "1", "2", ...: each commanded 0.2 m/s for 4 s, and gone at `speeds`.
-  void write_runs(const std::string& name, const std::vector<double>& speeds) const {
+  // A folder of runs "1", "2", ...: each commanded 0.2 m/s for 4 s, and gone at `speeds`;
+  // of such units of time.
+  void write_runs(const std::string& name, const std::vector<double>& speeds,
+                  double unit_s = 1) const {
     std::string commands = "run,t,v,omega\n", poses = "run,t,x,y,theta\n";
     for (std::size_t r = 0; r < speeds.size(); ++r) {
       const std::string run = std::to_string(r + 1) + ",";
-      commands += run + "0,0.2,0\n" + run + "4,0,0\n";
+      commands += run + "0,0.2,0\n" + run + std::to_string(4 * unit_s) + ",0,0\n";
       for (int i = 0; i <= 100; ++i) {
         const double t_s = 0.05 * i;
-        poses += run + std::to_string(t_s) + "," + std::to_string(speeds[r] * std::min(t_s, 4.0)) +
-                 ",0,0\n";
+        poses += run + std::to_string(unit_s * t_s) + "," +
+                 std::to_string(speeds[r] * std::min(t_s, 4.0)) + ",0,0\n";
       }
     }
     folder_.write(name + "/commands.csv", commands);
@@ -79,6 +81,15 @@ TEST_F(GroundCommands, ARunAndADiagnosisGoOnFromAnyFolder) {
   const Finished changed = shell("\"$G\" resume run --generations 3 --workers 1");
   EXPECT_EQ(changed.exit_code, 0) << changed.err;
   EXPECT_THAT(changed.err, HasSubstr("robot.toml has changed since the run began"));
+}
+
+TEST_F(GroundCommands, HorizonsAreNumbersFromZeroOn) {
+  for (const char* horizon : {"-1", "nan", "inf"}) {
+    const Finished refused = gapfarm_command(
+        {"horizons", config(""), "--trials", folder_ / "monday", "--horizons", horizon});
+    EXPECT_EQ(refused.exit_code, 2) << horizon;
+    EXPECT_THAT(refused.err, HasSubstr(std::string("--horizons: found ") + horizon));
+  }
 }
 
 }  // namespace gapfarm::ground_commands_test

@@ -1,12 +1,14 @@
 // gapfarm horizons RUN|CONFIG: how far off a ground robot's simulation is at several horizons.
 #include "master/ground/horizons.h"
 
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/recordings/read.h"
+#include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
@@ -38,6 +40,11 @@ Status draw_runs(const HorizonsCommand& command, const FittedRuns& fitted, const
 
 Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
+  for (const double horizon_s : command.horizons) {
+    if (std::isfinite(horizon_s) && horizon_s >= 0) continue;
+    return Error{"--horizons: found " + format_double(horizon_s) +
+                 ", expected lengths of windows in s, or 0 for whole runs"};
+  }
   ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, command.runs, console));
   command.outputs.reads(command.source);
   command.outputs.reads(fitted.robot_path);
