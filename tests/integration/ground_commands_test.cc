@@ -92,4 +92,13 @@ TEST_F(GroundCommands, HorizonsAreNumbersFromZeroOn) {
   }
 }
 
+TEST_F(GroundCommands, CheckFindsTimesInMilliseconds) {
+  write_runs("slow", {0.2}, 1e3);
+  const Finished checked = gapfarm_command({"check", config(""), "--trials", folder_ / "slow"});
+  EXPECT_EQ(checked.exit_code, 2) << checked.err;
+  EXPECT_THAT(checked.out,
+              AllOf(HasSubstr("readable, but the robot hardly moves, as if times were in another"),
+                    HasSubstr("Write times in s"), Not(HasSubstr("failed"))));
+}
+
 }  // namespace gapfarm::ground_commands_test

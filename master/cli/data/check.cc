@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "common/base/clock.h"
@@ -37,12 +38,16 @@ struct Summary {
   std::size_t sessions = 0;
   std::map<std::string, std::size_t> commands;
   std::size_t conditions = 0;
-  std::vector<std::string> effects;  // enabled: not neutral, or searched
-  double evaluation_s = 0;           // on one worker here, as measured
-  v1::TaskResult evaluated;          // the config's own values
+  std::vector<std::string> effects;         // enabled: not neutral, or searched
+  double evaluation_s = 0;                  // on one worker here, as measured
+  std::optional<v1::TaskResult> evaluated;  // the config's own values; none: not looked at
   std::vector<SanityFinding> sanity;
   std::vector<IdleGene> idle;
 };
+
+bool has_failed(const v1::TaskResult& result) {
+  return result.outcome() != v1::OK && result.outcome() != v1::INFEASIBLE;
+}
 
 // The config's own values by one worker, and the seconds that takes once it knows the problem.
 Status measure_evaluation(const Config& config, CliContext& context, Summary* summary) {
@@ -77,7 +82,7 @@ Status find_idle_genes(const Config& config, unsigned workers, CliContext& conte
   constexpr double kLongest_s = 60;
   const auto evaluations = static_cast<double>(config.problem.genes.size() + 1);
   if (config.problem.genes.empty()) return {};
-  if (summary->evaluated.outcome() == v1::WORKER_FAILED) return {};
+  if (!summary->evaluated || summary->evaluated->outcome() == v1::WORKER_FAILED) return {};
   const double all_s = evaluations * summary->evaluation_s / std::max(1u, workers);
   if (all_s > kLongest_s) {
     context.console.note("genes that change no score were not looked for: " +
@@ -172,11 +177,10 @@ Summary summarise(const Config& config) {
 }
 
 Json to_json(const Config& config, const Summary& summary, unsigned workers) {
-  Json genes = Json::array(),
-       evaluated = {{"outcome", v1::Outcome_Name(summary.evaluated.outcome())},
-                    {"message", summary.evaluated.message()}};
-  if (summary.evaluated.outcome() == v1::OK) {
-    evaluated["fitness"] = summary.evaluated.evaluate().fitness();
+  Json genes = Json::array(), evaluated;
+  if (const auto& result = summary.evaluated) {
+    evaluated = {{"outcome", v1::Outcome_Name(result->outcome())}, {"message", result->message()}};
+    if (result->outcome() == v1::OK) evaluated["fitness"] = result->evaluate().fitness();
   }
   Json idle = mapped(summary.idle, [&](const IdleGene& gene) -> Json {
     return {{"parameter", gene.key}, {"remedy", gene.remedy}};
@@ -222,7 +226,7 @@ std::string directions_text(const FitnessSettings& fitness) {
 
 // Of an objective, at the config's own values.
 std::string value_text(const FitnessSettings& fitness, const Summary& summary) {
-  const v1::TaskResult& result = summary.evaluated;
+  const v1::TaskResult& result = *summary.evaluated;
   const std::string more = result.message().empty() ? "" : "; " + result.message();
   std::string values;
   for (int i = 0; i < result.evaluate().objectives_size(); ++i) {
@@ -241,14 +245,10 @@ std::string value_text(const FitnessSettings& fitness, const Summary& summary) {
   }
 }
 
-bool has_failed(const v1::TaskResult& result) {
-  return result.outcome() != v1::OK && result.outcome() != v1::INFEASIBLE;
-}
-
 std::string standing(const Summary& summary) {
-  const v1::TaskResult& result = summary.evaluated;
-  if (has_failed(result)) {
-    return "readable, but the evaluation at the config's own values failed: " + result.message();
+  if (const auto& result = summary.evaluated; result && has_failed(*result)) {
+    return "readable, but the evaluation at the config's own values failed: " +
+           (result->message().empty() ? v1::Outcome_Name(result->outcome()) : result->message());
   }
   const std::vector<SanityFinding>& findings = summary.sanity;
   for (const SanityFinding& f : findings) {
@@ -351,8 +351,9 @@ Result<int> run_check(const CheckOptions& options, CliContext& context) {
     RETURN_IF_ERROR(find_idle_genes(config, workers, context, &summary));
   }
   console.result(describe(config, summary, workers), to_json(config, summary, workers));
-  if (summary.evaluated.outcome() == v1::WORKER_FAILED) return kExitQuarantined;
-  return summary.idle.empty() && !has_failed(summary.evaluated) ? kExitDone : kExitBadUsage;
+  if (!summary.evaluated) return kExitBadUsage;
+  if (summary.evaluated->outcome() == v1::WORKER_FAILED) return kExitQuarantined;
+  return summary.idle.empty() && !has_failed(*summary.evaluated) ? kExitDone : kExitBadUsage;
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"direction_reversed", "the motors run backward"},
       {"commands_unrelated", "commands and motions do not belong together"},
       {"unit_error", "it is in another unit"},
+      {"slow_runs", "the robot hardly moves, as if times were in another unit"},
       {"robot_out_of_bounds", "this is no robot that the scenario can be"},
       {"base_not_simulated", "the base model cannot be simulated"},
       {"base_on_bounds", "the tuned base sits on its bounds"},
