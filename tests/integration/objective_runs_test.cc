@@ -215,6 +215,14 @@ TEST_F(ObjectiveRuns, CheckEvaluatesOnceAndCompareNeedsNoTrials) {
   EXPECT_THAT(failed.out, AllOf(HasSubstr("own values failed: no mesh"), Not(HasSubstr(": fine"))));
 }
 
+TEST_F(ObjectiveRuns, CheckReportsOnceWhyTheProgramHasNoAnswer) {
+  const Finished checked = gapfarm_command({"check", config("    os._exit(9)\n")});
+  EXPECT_EQ(checked.exit_code, 3);
+  const std::string all = checked.out + checked.err, why = "ended with status 9";
+  ASSERT_NE(all.find(why), all.npos) << all;
+  EXPECT_EQ(all.find(why), all.rfind(why)) << all;
+}
+
 TEST_F(ObjectiveRuns, WhatNeedsTrialsRefusesInOneSentence) {
   const std::string file = config(""), run = folder_ / "run", out = folder_ / "out";
   ASSERT_EQ(evolve(file, "run", "1").exit_code, 0);
