@@ -223,6 +223,13 @@ TEST_F(ObjectiveRuns, CheckReportsOnceWhyTheProgramHasNoAnswer) {
   EXPECT_EQ(all.find(why), all.rfind(why)) << all;
 }
 
+TEST_F(ObjectiveRuns, CheckCountsNoStartAsAnEvaluation) {
+  const Finished checked = gapfarm_command(
+      {"check", config("    if task['id'] == 1: sum(range(60000000))\n"), "--json"});
+  ASSERT_EQ(checked.exit_code, 0) << checked.err;
+  EXPECT_LT(json::parse(checked.out)["evaluation_s"], 0.5);
+}
+
 TEST_F(ObjectiveRuns, WhatNeedsTrialsRefusesInOneSentence) {
   const std::string file = config(""), run = folder_ / "run", out = folder_ / "out";
   ASSERT_EQ(evolve(file, "run", "1").exit_code, 0);
