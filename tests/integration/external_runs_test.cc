@@ -60,6 +60,11 @@ TEST_F(ExternalRuns, EvolveResumeAndPredict) {
   EXPECT_THAT(predicted.out, HasSubstr("s,3,"));
 }
 
+TEST_F(ExternalRuns, CheckNamesTheProgram) {
+  const Finished checked = gapfarm_command({"check", config("")});
+  EXPECT_THAT(checked.out, HasSubstr("scenario     external, ahead\n")) << checked.err;
+}
+
 TEST_F(ExternalRuns, WhatCrashesThreeTimesIsGivenUpAndTheRunGoesOn) {
   const Finished finished = evolve(config("    if speed > 0.7: os._exit(9)\n"), "run", "2");
   EXPECT_EQ(finished.exit_code, 3) << finished.err;

@@ -326,7 +326,9 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
     return text + search_text(config, summary, workers);
   }
   // The first row of every other table is the model that is simulated.
-  if (problem.ground) {
+  if (problem.external) {
+    text += problem.external->table.declaration().name + "\n";
+  } else if (problem.ground) {
     text += drive_names()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
   } else {
     text += problem.table()[0].key + " " + problem.table().format(0, problem.values[0]);
