@@ -261,6 +261,9 @@ PairedGain gain_over(const Model& with, const Model& without, Eigen::Index commo
 
 Result<Model> model_of(const Forward& forward, const Observations& observations, Space space,
                        Fit fit) {
+  if (!std::isfinite(fit.score)) {
+    return Error{"the model to start from cannot be simulated", ErrorCode::kSimulation};
+  }
   const Fitter fitter(forward, observations, space);
   if (!fit.fresh || fit.slopes.size() == 0) {
     if (Status s = fitter.differentiate(&fit); !s) return s.error();

@@ -42,6 +42,7 @@ struct Model {
   Fit fit;                       // slopes are its own
   std::vector<double> held_out;  // log score of each observation, nats
 };
+// Errors: the simulation's own, and a fit at a point that it cannot simulate.
 Result<Model> model_of(const Forward& forward, const Observations& observations, Space space,
                        Fit fit);
 

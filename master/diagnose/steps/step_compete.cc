@@ -118,6 +118,7 @@ class Selection {
   Result<infer::Model> fitted(infer::Space space, const Eigen::VectorXd& from) const {
     const infer::Fitter fitter(competition_.forward(), competition_.observations(), space);
     ASSIGN_OR_RETURN(auto fit, fitter.start(from));
+    if (!std::isfinite(fit.score)) return of_.predictor.failed("the model to begin at");
     if (Status s = fitter.improve(&fit, infer::kLongSearch); !s) return s.error();
     return infer::model_of(competition_.forward(), competition_.observations(), std::move(space),
                            std::move(fit));

@@ -101,6 +101,21 @@ Model base_of(const Forward& f, const Observations& o) {
   return model_of(f, o, space, std::move(fit)).value();
 }
 
+TEST(InferModel, OfAPointThatCannotBeSimulatedIsAnError) {
+  const Forward diverges = [](const std::vector<PredictionRequest>& points)
+      -> Result<std::vector<std::optional<std::vector<Pose>>>> {
+    return std::vector<std::optional<std::vector<Pose>>>(points.size());
+  };
+  const Observations o = observed({});
+  const Space space(push_table(), {friction()});
+  const Fitter fitter(diverges, o, space);
+  Fit fit = fitter.start(space.from({})).value();
+  EXPECT_TRUE(fitter.improve(&fit, 20));
+  const auto model = model_of(diverges, o, space, std::move(fit));
+  ASSERT_FALSE(model.ok());
+  EXPECT_EQ(model.error().code, ErrorCode::kSimulation);
+}
+
 TEST(InferSpace, GoesThereAndBack) {
   const Space space = Space(push_table(), {friction()}).with(tilt().coordinates);
   const Overrides values = {{row("finger_friction"), 0.31},
