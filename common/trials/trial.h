@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -21,6 +22,7 @@ struct TipSample {
   double t_s = 0;  // since the push began
   double x = 0;    // m, world frame
   double y = 0;
+  std::size_t line = 0;  // of its file; 0: it is of none
 };
 
 // One command driven once by the real robot.  Poses are measured, in the world frame.
@@ -36,6 +38,8 @@ struct Trial {
   std::vector<std::string> extra;     // values of TrialLog::extra_columns
   std::vector<PathSample> path;       // empty: not logged
   std::vector<TipSample> tip;         // push logs only: what was done; times increase
+  std::string tip_file;               // that these were read from
+  std::size_t line = 0;               // of its file; 0: it is of none
   std::optional<std::uint32_t> run;   // windows only: of the problem's runs; t_s is on its clock
 };
 

@@ -46,6 +46,7 @@ class TrialParser {
  private:
   Trial parse_row(const CsvRow& row, const CsvHeader& header, std::vector<Error>& errors) {
     Trial trial;
+    trial.line = row.fields.front().place.line;
     if (Status width = check_width(row, header, file_); !width.ok()) {
       errors.push_back(width.error());
       return trial;
@@ -228,7 +229,8 @@ PathSample read_path_sample(CsvRowReader& reader) {
 
 TipSample read_tip_sample(CsvRowReader& reader) {
   const double t_s = sample_time(reader);
-  return {t_s, reader.coordinate(kTipX), reader.coordinate(kTipY)};
+  return {t_s, reader.coordinate(kTipX), reader.coordinate(kTipY),
+          reader.field(kPathTime).place.line};
 }
 
 }  // namespace
@@ -288,6 +290,11 @@ void add_tips(std::string_view text, const std::string& file, const std::vector<
                                    &Trial::tip,
                                    false};
   add_samples(form, text, file, logs, mistakes);
+  for (TrialLog* log : logs) {
+    for (Trial& trial : log->trials) {
+      if (!trial.tip.empty() && trial.tip_file.empty()) trial.tip_file = file;
+    }
+  }
 }
 
 }  // namespace gapfarm

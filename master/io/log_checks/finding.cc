@@ -30,7 +30,8 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"untouched", "the finger does not touch the pieces"},
       {"headings_rounded", "headings are rounded"},
       {"impossible_rows", "some rows cannot be"},
-      {"false_readings", "some readings are false"}};
+      {"false_readings", "some readings are false"},
+      {"tip_jumps", "the finger jumps"}};
   const auto found = phrases.find(finding.name);
   if (found != phrases.end()) return found->second;
   std::string words = finding.name;

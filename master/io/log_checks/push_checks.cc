@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "common/math/statistics.h"
 #include "common/parameters/push.h"
 #include "master/io/log_checks/log_checks.h"
 #include "master/io/log_checks/pose_faults.h"
+#include "master/io/log_checks/run_checks.h"
 
 namespace gapfarm {
 namespace {
@@ -211,7 +213,41 @@ SanityFinding far_apart(const Problem& problem, double nearest_m, double reach_m
   return found;
 }
 
+// The fingers' ways as what check_jumps() looks at.
+RunLog tip_runs(const TrialLog& log) {
+  RunLog runs;
+  for (const Trial& trial : log.trials) {
+    LoggedRun& run = runs.runs.emplace_back();
+    for (const TipSample& s : trial.tip) run.poses.push_back({s.t_s, {s.x, s.y, 0}});
+  }
+  return runs;
+}
+
 }  // namespace
+
+TipJumps check_tip_jumps(const TrialLog& log) {
+  const auto samples = check_jumps(tip_runs(log)).false_poses;
+  TipJumps jumps;
+  for (const auto& [trial, sample] : samples) {
+    if (jumps.trials.empty() || jumps.trials.back() != trial) jumps.trials.push_back(trial);
+  }
+  if (samples.empty()) return jumps;
+  const auto& [first, at] = *samples.begin();
+  const Trial& trial = log.trials[first];
+  const TipSample& s = trial.tip[at];
+  const std::string file = trial.tip_file.empty() ? "tips.csv" : trial.tip_file;
+  jumps.findings.push_back(
+      {"tip_jumps",
+       "The finger jumps there and back in " + std::to_string(jumps.trials.size()) +
+           " pushes, to where no step of it leads (the first: " + file +
+           (s.line > 0 ? ":" + std::to_string(s.line) : "") + ", session " + trial.session +
+           ", trial " + std::to_string(trial.trial) + ", x = " + few_digits(s.x) +
+           " m, y = " + few_digits(s.y) + " m at t = " + few_digits(s.t_s) + " s).",
+       "Remove such rows, " + std::to_string(samples.size()) +
+           " in all, from the fingers' ways; a diagnosis leaves these pushes out.",
+       Severity::kNote});
+  return jumps;
+}
 
 void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) {
   const double finger = problem.values[row_of(Push::kFingerRadius)];

@@ -28,7 +28,7 @@ constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;
 constexpr double kTimesAStep = 3;       // where half a turn is no more than a few of them
 constexpr std::size_t kNeighbours = 4;  // either way
 constexpr double kUsualShare = 0.8;     // of the steps are shorter: a tracker may lose some
-constexpr double kMostLost = 0.1;       // of a run, before the tracker found the robot
+constexpr double kMostLost = 0.1;       // of a run or one pose, before the tracker found the robot
 
 std::string name_of(const LoggedRun& run) { return "run " + run.run; }
 
@@ -193,7 +193,8 @@ std::vector<std::size_t> lost_poses(const LoggedRun& run, std::size_t start, int
                                     const Length& length) {
   const std::vector<PoseRow>& poses = run.poses;
   const std::vector<double> times = usual_times(run);
-  const auto most = static_cast<std::size_t>(kMostLost * static_cast<double>(poses.size()));
+  const auto share = static_cast<std::size_t>(kMostLost * static_cast<double>(poses.size()));
+  const std::size_t most = std::max<std::size_t>(1, share);
   std::vector<std::size_t> all, lost;
   std::size_t last = start;
   for (std::size_t i = start + way; i < poses.size(); i += way) {  // below 0 it is large

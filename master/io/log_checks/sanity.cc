@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -140,17 +141,20 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
 
 struct ImpossibleTrials {
   std::vector<std::size_t> fast, contradicted;  // no trial is both
+  TipJumps finger = {};
 
   std::vector<std::size_t> rows() const {
-    std::vector<std::size_t> all;
-    std::ranges::merge(fast, contradicted, std::back_inserter(all));
-    return all;
+    std::set<std::size_t> all(finger.trials.begin(), finger.trials.end());
+    all.insert(fast.begin(), fast.end());
+    all.insert(contradicted.begin(), contradicted.end());
+    return {all.begin(), all.end()};
   }
 };
 
 ImpossibleTrials find_impossible(const Problem& problem) {
   ImpossibleTrials found;
   if (has_drives(problem)) found.fast = too_fast_trials(problem);
+  if (problem.scenario == "push") found.finger = check_tip_jumps(problem.log);
   if (!has_drives(problem) && problem.scenario != "push") return found;
   std::ranges::set_difference(false_readings(problem), found.fast,
                               std::back_inserter(found.contradicted));
@@ -159,6 +163,7 @@ ImpossibleTrials find_impossible(const Problem& problem) {
 
 void note_impossible(const Problem& problem, const ImpossibleTrials& found,
                      std::vector<SanityFinding>* findings) {
+  *findings = found.finger.findings;
   note_rows(problem, found.fast, "impossible_rows",
             "end farther from their start than twice the log's own speed leads", findings);
   note_rows(problem, found.contradicted, "false_readings",

@@ -17,7 +17,7 @@ inline constexpr std::size_t kFewestTrials = 40;
 // per cent of wild rows.  `impossible`: set to the trials that cannot be, ascending: drives for
 // which the robot would have had to move at more than twice the log's own speed and 30 cm beyond
 // (none where they are so many that the speed itself is in question), and trials that other
-// readings contradict (false_readings()).
+// readings contradict (false_readings()), and pushes whose finger jumps (check_tip_jumps()).
 std::vector<SanityFinding> check_sanity(const Problem& problem,
                                         std::vector<std::size_t>* impossible = nullptr);
 

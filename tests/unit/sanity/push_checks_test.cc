@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <numbers>
 
@@ -60,6 +61,22 @@ TEST(PushChecks, LeaveOutPiecesThatTheTrackerHasLost) {
   const std::vector<std::size_t> lost = {3, 4, 11};
   for (const std::size_t row : lost) log.log.trials[row].X_WE = {2, 2, 0};
   EXPECT_EQ(impossible_trials(log), lost);
+}
+
+TEST(PushChecks, NameTheSamplesThatTheFingerJumpsTo) {
+  Problem log = pushed();
+  Trial &middle = log.log.trials[7], &end = log.log.trials[12];
+  middle.tip_file = "m/tips.csv";
+  middle.tip[3].x = 5;
+  middle.tip[3].line = 61;
+  end.tip.back() = {end.tip.back().t_s, 4, 4};
+  EXPECT_EQ(impossible_trials(log), (std::vector<std::size_t>{7, 12}));
+  const auto findings = check_sanity(log);
+  const auto jumps = std::ranges::find(findings, "tip_jumps", &SanityFinding::name);
+  ASSERT_NE(jumps, findings.end());
+  EXPECT_NE(jumps->text.find("m/tips.csv:61, session s, trial 7, x = 5 m"), std::string::npos)
+      << jumps->text;
+  EXPECT_NE(jumps->remedy.find("2 in all"), std::string::npos) << jumps->remedy;
 }
 
 TEST(PushChecks, NameHowPosesDoNotFitTheFingersWay) {
