@@ -10,6 +10,7 @@
 #include "common/trials/files.h"
 #include "common/trials/format.h"
 #include "common/trials/mark.h"
+#include "common/trials/text/csv.h"
 #include "common/trials/text/mistakes.h"
 #include "common/trials/text/trial_parser.h"
 
@@ -119,11 +120,27 @@ void add_file(const std::string& file, const std::vector<Part*>& parts, AddSampl
   add(*text, file, logs, mistakes);
 }
 
+// A push whose finger's way nobody knows is a row with a mistake.
+void drop_without_tips(Part& part, const std::string& tips, Mistakes& mistakes) {
+  constexpr std::size_t kFewestSamples = 2;
+  const bool any = !part.log.trials.empty();
+  std::erase_if(part.log.trials, [&](const Trial& trial) {
+    if (trial.tip.size() >= kFewestSamples) return false;
+    mistakes.add_row({text_error(
+        part.file, {trial.line, 1}, "a push with fewer than two samples of the finger's way",
+        "all of it in " + tips, "add the rows of its session and trial there, or remove it")});
+    return true;
+  });
+  if (any && part.log.trials.empty()) mistakes.add_no_row(part.file);
+}
+
 void read_tips(std::vector<Part>& parts, std::vector<std::string>& read, Mistakes& mistakes) {
   for (const auto& [file, of] : companions(parts, "tips.csv", &ReadableLog::tips)) {
     std::error_code code;
     if (fs::exists(file, code)) {
       add_file(file.string(), of, add_tips, read, mistakes);
+      if (!mistakes.status().ok()) continue;
+      for (Part* part : of) drop_without_tips(*part, file.string(), mistakes);
       continue;
     }
     const Part& first = *of.front();

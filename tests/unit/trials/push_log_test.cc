@@ -73,6 +73,22 @@ TEST(PushLog, NeedsItsTips) {
   EXPECT_THAT(log.error().message, HasSubstr("found no tips.csv beside it"));
 }
 
+TEST(PushLog, APushWithoutItsTipsIsARowWithAMistake) {
+  const TemporaryFolder folder;
+  const std::string pushes =
+      folder.write("pushes.csv", kTwoPushes + "a,2,square,0,0,0,1,0,0,0.1\n");
+  folder.write("tips.csv", "session,trial,t,x,y\na,1,0,0,0\na,1,2,0,1\n");
+  const auto log = read_trial_files({{pushes}}, kPieces);
+  ASSERT_FALSE(log.ok());
+  EXPECT_THAT(log.error().message, HasSubstr("pushes.csv:2:1: found a push with fewer than two"));
+  EXPECT_THAT(log.error().message, HasSubstr("; also in line 4"));
+  const auto rest = read_trial_files({{pushes}}, kPieces, {.skip_invalid = true});
+  ASSERT_TRUE(rest.ok()) << rest.error().message;
+  ASSERT_EQ(rest->trials.size(), 1u);
+  EXPECT_EQ(rest->trials.front().trial, 1);
+  EXPECT_EQ(rest->notes.size(), 2u);
+}
+
 TEST(PushLog, TipsMustIncreaseInTime) {
   auto log = parse_pushes(kTwoPushes, "pushes.csv", kPieces);
   const Status status =
