@@ -85,6 +85,8 @@ TEST_F(DiagnosePushes, ReportNoneWhenNothingIsMissing) {
   EXPECT_EQ(d["verdict"], "none") << d["headline"];
   EXPECT_TRUE(d["effects"].empty());
   for (const Json& row : d["screening"]) {
+    // A drive's reason.
+    EXPECT_EQ(row["note"].get<std::string>().find("full speed"), std::string::npos) << row;
     if (row["effect"] != "com_offset") continue;
     // 8 mm is named elsewhere.
     EXPECT_GT(row["detectable_from"]["y"], 0.0005);

@@ -47,6 +47,8 @@ ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
   if (name == "motor_lag" && named.lag.trials > 0) {
     return {named.lag.gain, "tau", named.lag.tau_s, "by the logged paths"};
   }
+  // Competing hypotheses are all fitted, and those that lead somewhere are rows of the screening.
+  if (of.subject.signatures == nullptr) return note("fitted with the base: explains nothing more");
   return note("cannot be seen in this log: one level and one duration make it another full speed");
 }
 
