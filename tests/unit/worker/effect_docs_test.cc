@@ -20,10 +20,13 @@ std::string read(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-std::string section_of(const std::string& page, const std::string& name) {
-  const std::size_t begin = page.find("\n## " + name + "\n");
+// From a heading of these marks ("##") that begins with the name to the next one.
+std::string section_of(const std::string& page, const std::string& marks, const std::string& name) {
+  const std::string heading = "\n" + marks + " ";
+  std::size_t begin = page.find(heading + name + "\n");
+  if (begin == std::string::npos) begin = page.find(heading + name + " ");
   if (begin == std::string::npos) return "";
-  return page.substr(begin, page.find("\n## ", begin + 1) - begin);
+  return page.substr(begin, page.find(heading, begin + 1) - begin);
 }
 
 // "| rate | 1/min | 0 | -0.05 to 0.05 |"
@@ -46,16 +49,22 @@ std::string row_of(const Effect& effect, std::size_t i) {
   return row.str();
 }
 
+void expect_described(const std::string& section, const Effect& effect) {
+  EXPECT_THAT(section, HasSubstr("Confused with: ")) << effect.name;
+  for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+    EXPECT_THAT(section, HasSubstr(row_of(effect, i))) << effect.name;
+  }
+}
+
 TEST(EffectDocs, EveryRowOfTheCatalogueHasItsSectionWithItsParameters) {
   const std::string page = read(kDocs / "effects.md");
   for (const Effect& effect : srv1_effects()) {
-    const std::string section = section_of(page, effect.name);
-    ASSERT_FALSE(section.empty()) << effect.name;
+    const std::string section = section_of(page, "##", effect.name);
+    expect_described(section, effect);
     EXPECT_THAT(section, HasSubstr("](pictures/effects/" + effect.name + ".svg)"));
-    EXPECT_THAT(section, HasSubstr("Confused with: "));
-    for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-      EXPECT_THAT(section, HasSubstr(row_of(effect, i))) << effect.name;
-    }
+  }
+  for (const Effect& effect : push_effects()) {
+    expect_described(section_of(page, "###", effect.name), effect);
   }
 }
 
