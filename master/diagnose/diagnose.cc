@@ -22,16 +22,6 @@
 namespace gapfarm {
 namespace {
 
-Status check_excluded(const Problem& problem, const std::vector<std::string>& excluded) {
-  std::vector<std::string> known = mapped(problem.table().effects(), &Effect::name);
-  for (const std::string& name : excluded) {
-    if (!contains(known, name)) {
-      return Error{"there is no effect '" + name + "' to omit" + suggestion(name, known)};
-    }
-  }
-  return {};
-}
-
 // What the catalogue makes of a log.
 struct Answer {
   std::optional<steps::Screening> screening;
@@ -155,6 +145,16 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   d.sanity.insert(d.sanity.end(), log.sanity.begin(), log.sanity.end());
   fill_conclusions(*subject->effects, &d);
   return result;
+}
+
+Status check_excluded(const Problem& problem, const std::vector<std::string>& excluded) {
+  std::vector<std::string> known = mapped(problem.table().effects(), &Effect::name);
+  for (const std::string& name : excluded) {
+    if (!contains(known, name)) {
+      return Error{"there is no effect '" + name + "' to omit" + suggestion(name, known)};
+    }
+  }
+  return {};
 }
 
 PreparedLog prepare_log(const Problem& problem, const std::optional<Eigen::Vector2d>& frame_m) {

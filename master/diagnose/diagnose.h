@@ -60,6 +60,9 @@ struct DiagnosisResult {
   std::vector<std::pair<std::string, std::vector<v1::Task>>> fits;
 };
 
+// An error where the problem's catalogue has no such effect to omit.
+Status check_excluded(const Problem& problem, const std::vector<std::string>& excluded);
+
 // A log that cannot be used is reported without any simulation (verdict "unusable"), and what
 // cannot be simulated is excluded and reported.  Errors: a scenario that cannot be diagnosed, an
 // empty log, an effect to omit that the catalogue does not have, the farm's.

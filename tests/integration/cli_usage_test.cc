@@ -109,6 +109,27 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
   }
 }
 
+// What is wrong with the request is found before any work, by a dry run too.
+TEST(CliUsage, WrongNamesAreWrongUsageAndLeaveNothing) {
+  const TemporaryFolder folder;
+  const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml", out = folder / "out";
+  const std::vector<std::pair<std::vector<std::string>, const char*>> commands = {
+      {{"diagnose", demo, "--out", out, "--exclude", "camera_seem"}, "camera_seam"},
+      {{"crossfit", demo, "--by", "nosuch"}, "nosuch"},
+      {{"crossfit", demo, "--test", "command=disc"}, "no trials are left"},
+  };
+  for (auto [arguments, named] : commands) {
+    for (const bool dry : {true, false}) {
+      if (dry) arguments.push_back("--dry-run");
+      const Finished refused = gapfarm_command(arguments);
+      if (dry) arguments.pop_back();
+      EXPECT_EQ(refused.exit_code, 2) << arguments[0] << ": " << refused.err;
+      EXPECT_THAT(refused.err, HasSubstr(named));
+      EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << arguments[0];
+    }
+  }
+}
+
 TEST(CliUsage, ADryRunOfWhatGoesOnFromARunLeavesItAsItIs) {
   const TemporaryFolder folder;
   const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml", run = folder / "run",
@@ -118,6 +139,9 @@ TEST(CliUsage, ADryRunOfWhatGoesOnFromARunLeavesItAsItIs) {
                 .exit_code,
             0);
   const std::string store = text_of(run + "/run.sqlite");
+  const Finished later = gapfarm_command({"resume", run, "--generation", "99"});
+  EXPECT_EQ(later.exit_code, 2);
+  EXPECT_THAT(later.err, HasSubstr("has no generation 99, the last is 1"));
   const std::vector<std::pair<std::vector<std::string>, const char*>> commands = {
       {{"resume", run, "--generations", "9"}, "after generation 1 to at most 9"},
       {{"determine", demo, "--model", model, "--out", out}, "would look at the likelihood"},

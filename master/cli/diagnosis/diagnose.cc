@@ -204,6 +204,9 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
     config.problem.values = model.values;
     frame = {model.frame_x_m, model.frame_y_m};
   }
+  if (!config.problem.windows()) {
+    RETURN_IF_ERROR(check_excluded(config.problem, command.exclude));
+  }
   searched = std::move(config.problem.genes);
   config.problem.genes.clear();
   config.problem.fitness.kind = FitnessKind::kLogScore;

@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/cli/evolution/evolution.h"
@@ -32,6 +33,18 @@ void note_changed_robot(const Config& config, Console& console) {
   console.note(config.robot_path +
                " has changed since the run began, which goes on with the robot as it was; "
                "`gapfarm evolve` takes the file as it is");
+}
+
+// An error where the run has no such generation to go on from.
+Status check_generation(const ResumeCommand& command) {
+  if (!command.branch.generation) return {};
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  if (contains(generations, *command.branch.generation, &StoredGeneration::generation)) return {};
+  const std::string last =
+      generations.empty() ? "none" : std::to_string(generations.back().generation);
+  return Error{command.run + ": has no generation " + std::to_string(*command.branch.generation) +
+               ", the last is " + last + "; give an earlier one to --generation"};
 }
 
 // By its reader: a store of an older version stays as it is.
@@ -84,6 +97,7 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
     return Error{"--fix and --free make a run of its own and leave " + command.run +
                  " as it is; name its folder by --out"};
   }
+  RETURN_IF_ERROR(check_generation(command));
   if (context.dry_run) return print_resume(command, context);
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);

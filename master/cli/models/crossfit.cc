@@ -142,10 +142,11 @@ Result<int> run_crossfit(const CrossfitOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(const auto config,
                    open_config(options.config, options.trials, context.console,
                                [&](Config& read) { return apply(options, read); }));
+  CrossfitPlan plan = plan_of(options, config);
+  RETURN_IF_ERROR(check_crossfit(config.problem, plan));
   if (context.dry_run) return print_fits(options, config, context);
   LongCommand::begin_if_possible("crossfit", options.keep.place("crossfit", ""), {{"fit"}},
                                  context);
-  CrossfitPlan plan = plan_of(options, config);
   plan.hooks = context.work->hooks();
   ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
   ASSIGN_OR_RETURN(const auto groups, crossfit(config.problem, plan, *asked));

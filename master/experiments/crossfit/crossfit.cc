@@ -47,26 +47,52 @@ std::vector<Pose> mean_of_repeats(const TrialLog& log,
   return ends;
 }
 
+// Whether there is something to tune on and to try on, and all that is named.
+Status check_log(const Problem& problem, const CrossfitPlan& plan, const TrialLog& log) {
+  RETURN_IF_ERROR(select_trials(log, plan.train));
+  for (const std::vector<std::string>& filters : plan.tests) {
+    RETURN_IF_ERROR(select_trials(log, filters));
+  }
+  std::vector<std::string> columns = plan.repeats;
+  if (!plan.per.empty()) columns.push_back(plan.per);
+  for (const std::string& column : columns) RETURN_IF_ERROR(trial_column_reader(log, column));
+  for (const std::string& key : plan.sweeps) {
+    if (!problem.table().find(key)) return Error{"--sweep " + key + ": there is no such parameter"};
+  }
+  return {};
+}
+
+// A fit's trials: those of a value of the plan's `by`, or all.
+struct Part {
+  std::string value;
+  TrialLog log;
+};
+
+Error named(const CrossfitPlan& plan, const std::string& value, const Error& error) {
+  return plan.by.empty() ? error : Error{plan.by + "=" + value + ": " + error.message, error.code};
+}
+
+Result<std::vector<Part>> parts_of(const Problem& problem, const CrossfitPlan& plan) {
+  std::vector<std::string> values = {""};
+  if (!plan.by.empty()) {
+    ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
+    values = values_in(problem.log, by);
+  }
+  std::vector<Part> parts;
+  for (const std::string& value : values) {
+    std::vector<std::string> filters;
+    if (!plan.by.empty()) filters.push_back(plan.by + "=" + value);
+    ASSIGN_OR_RETURN(auto log, select_trials(problem.log, filters));
+    if (Status s = check_log(problem, plan, log); !s) return named(plan, value, s.error());
+    parts.push_back({value, std::move(log)});
+  }
+  return parts;
+}
+
 class Crossfit {
  public:
   Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
       : problem_(problem), plan_(plan), farm_(farm) {}
-
-  // Whether there is something to tune on and to try on, and all that is named.
-  Status check(const TrialLog& log) const {
-    RETURN_IF_ERROR(select_trials(log, plan_.train));
-    for (const std::vector<std::string>& filters : plan_.tests) {
-      RETURN_IF_ERROR(select_trials(log, filters));
-    }
-    std::vector<std::string> columns = plan_.repeats;
-    if (!plan_.per.empty()) columns.push_back(plan_.per);
-    for (const std::string& column : columns) RETURN_IF_ERROR(trial_column_reader(log, column));
-    for (const std::string& key : plan_.sweeps) {
-      if (!problem_.table().find(key))
-        return Error{"--sweep " + key + ": there is no such parameter"};
-    }
-    return {};
-  }
 
   Result<CrossfitGroup> group(const std::string& name, const TrialLog& log) {
     CrossfitGroup group;
@@ -251,31 +277,21 @@ EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
   return errors;
 }
 
+Status check_crossfit(const Problem& problem, const CrossfitPlan& plan) {
+  if (const auto parts = parts_of(problem, plan); !parts) return parts.error();
+  return {};
+}
+
 Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const CrossfitPlan& plan,
                                             Farm& farm) {
+  ASSIGN_OR_RETURN(const std::vector<Part> parts, parts_of(problem, plan));
+  plan.hooks.planned(stages_of(mapped(parts, &Part::value), plan, problem.genes.size()));
   Crossfit fit(problem, plan, farm);
-  std::vector<std::string> values = {""};
-  if (!plan.by.empty()) {
-    ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
-    values = values_in(problem.log, by);
-  }
-  const auto named = [&](const std::string& value, const Error& error) {
-    return plan.by.empty() ? error : Error{plan.by + "=" + value + ": " + error.message};
-  };
-  std::vector<TrialLog> logs;
-  for (const std::string& value : values) {
-    std::vector<std::string> filters;
-    if (!plan.by.empty()) filters.push_back(plan.by + "=" + value);
-    ASSIGN_OR_RETURN(auto log, select_trials(problem.log, filters));
-    if (Status s = fit.check(log); !s) return named(value, s.error());
-    logs.push_back(std::move(log));
-  }
-  plan.hooks.planned(stages_of(values, plan, problem.genes.size()));
   std::vector<CrossfitGroup> groups;
-  for (std::size_t k = 0; k < values.size(); ++k) {
+  for (std::size_t k = 0; k < parts.size(); ++k) {
     plan.hooks.began(k);
-    auto group = fit.group(values[k], logs[k]);
-    if (!group) return named(values[k], group.error());
+    auto group = fit.group(parts[k].value, parts[k].log);
+    if (!group) return named(plan, parts[k].value, group.error());
     groups.push_back(std::move(*group));
   }
   return groups;

@@ -92,6 +92,10 @@ struct CrossfitGroup {
   std::vector<Sweep> sweeps;
 };
 
+// What of the plan can be seen to fail before anything is simulated: a column, a filter or a
+// parameter that is not there, a fit or a set without trials.
+Status check_crossfit(const Problem& problem, const CrossfitPlan& plan);
+
 // REQUIRES: a problem with genes and a log.  Errors: of select_trials() and tune(); an untuned or a
 // tuned simulation that fails; a sweep of an unknown parameter.
 Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const CrossfitPlan& plan,
