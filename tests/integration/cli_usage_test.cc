@@ -112,11 +112,13 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
 // What is wrong with the request is found before any work, by a dry run too.
 TEST(CliUsage, WrongNamesAreWrongUsageAndLeaveNothing) {
   const TemporaryFolder folder;
-  const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml", out = folder / "out";
+  const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml", out = folder / "out",
+                    push = GAPFARM_SOURCE_DIR "/configs/push.toml";
   const std::vector<std::pair<std::vector<std::string>, const char*>> commands = {
       {{"diagnose", demo, "--out", out, "--exclude", "camera_seem"}, "camera_seam"},
       {{"crossfit", demo, "--by", "nosuch"}, "nosuch"},
       {{"crossfit", demo, "--test", "command=disc"}, "no trials are left"},
+      {{"effects", push, "--figures", out}, "omit --figures"},
   };
   for (auto [arguments, named] : commands) {
     for (const bool dry : {true, false}) {

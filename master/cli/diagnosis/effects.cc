@@ -179,6 +179,13 @@ Result<Config> figure_config(const EffectsOptions& options) {
   } else {
     ASSIGN_OR_RETURN(auto read, read_config(options.config));
     RETURN_IF_ERROR(check_moves(read.problem.scenario, options.config));
+    if (scenario_form(read.problem.scenario).pieces) {
+      return Error{options.config +
+                   ": --figures draws what effects do to a robot's commands, and scenario " +
+                   read.problem.scenario +
+                   " has none; omit --figures to list its effects (docs/effects.md describes "
+                   "them), or give a config of scenario srv1"};
+    }
     config = std::move(read);
   }
   Problem& problem = config.problem;
@@ -276,7 +283,7 @@ SubcommandRun setup_effects(CLI::App& app) {
       "CONFIG", options->config,
       "Whose catalogue, and the robot of the pictures; default: tracked robots, a nominal one");
   app.add_option("--figures", options->figures,
-                 "Draw what each effect does to the commands, as SVG, into this folder");
+                 "Draw what each effect does to a robot's commands, as SVG, into this folder");
   options->outputs.declare(app);
   options->farm.declare(app, false);
   declare_long_command(app);
