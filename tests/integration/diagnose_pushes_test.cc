@@ -151,4 +151,15 @@ TEST_F(DiagnosePushes, PlansPushesWithTheFingersWays) {
   EXPECT_NE(chained.err.find("put down before every push"), std::string::npos) << chained.err;
 }
 
+// What was simulated at the config's own values is only scored again, which costs nothing.
+TEST(CheckPushes, MeasuresWhatAnEvaluationOfEvolveCosts) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_program("planar_push_log", {folder.path().string(), "1"}).exit_code, 0);
+  const Finished checked = gapfarm_command({"check", GAPFARM_SOURCE_DIR "/configs/push.toml",
+                                            "--trials", folder / "trials.csv", "--json"});
+  ASSERT_EQ(checked.exit_code, 0) << checked.err;
+  // 95 pushes of some hundred steps; a fiftieth of what a quick machine takes.
+  EXPECT_GT(Json::parse(checked.out)["evaluation_s"].get<double>(), 0.001);
+}
+
 }  // namespace gapfarm::diagnose_pushes_test
