@@ -12,6 +12,7 @@
 #include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
+#include "master/io/log_checks/sanity.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"
 
@@ -245,6 +246,17 @@ void show_notes(const TrialLog& log, Console& console) {
     text += " and " + std::to_string(log.files.size() - kMostFilesShown) + " files more";
   }
   console.note(text);
+}
+
+void show_warnings(const Problem& problem, Console& console) {
+  if (problem.ground || problem.windows()) return;
+  std::vector<std::size_t> impossible;
+  for (const SanityFinding& f : check_sanity(problem, &impossible)) {
+    // Few trials are enough to tune by; notes count where they are about rows.
+    if (f.name == "too_few_trials" || (f.severity == Severity::kNote && impossible.empty()))
+      continue;
+    console.note(f.name + ": " + f.text + " " + f.remedy);
+  }
 }
 
 namespace {

@@ -67,6 +67,9 @@ struct TrialOptions {
 // What the readers omitted from a log and which files they read, to stderr.
 void show_notes(const TrialLog& log, Console& console);
 
+// The warnings of `check` about the log, a note each, except that its trials are few.
+void show_warnings(const Problem& problem, Console& console);
+
 std::size_t count_sessions(const TrialLog& log);
 
 // A config with its trials read: those given, else the config's own.  Errors: neither names any

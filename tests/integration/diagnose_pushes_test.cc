@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/trials/read.h"
+#include "common/trials/write.h"
 #include "tests/integration/diagnose_program.h"
 
 namespace gapfarm::diagnose_pushes_test {
@@ -160,6 +161,27 @@ TEST(CheckPushes, MeasuresWhatAnEvaluationOfEvolveCosts) {
   ASSERT_EQ(checked.exit_code, 0) << checked.err;
   // 95 pushes of some hundred steps; a fiftieth of what a quick machine takes.
   EXPECT_GT(Json::parse(checked.out)["evaluation_s"].get<double>(), 0.001);
+}
+
+TEST(EvolvePushes, BeginsWithTheWarningsOfCheck) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_program("planar_push_log", {folder.path().string(), "1"}).exit_code, 0);
+  const std::vector<std::string> pieces = {"square", "parallelogram", "triangle_s", "triangle_l"};
+  auto log = read_trial_files({{folder / "trials.csv"}}, pieces);
+  ASSERT_TRUE(log.ok()) << log.error().message;
+  for (Trial& trial : log->trials) {
+    for (Pose* X : {&trial.X_WS, &trial.X_WE}) *X = {1000 * X->x, 1000 * X->y, X->theta};
+    for (TipSample& s : trial.tip) s = {s.t_s, 1000 * s.x, 1000 * s.y};
+  }
+  ASSERT_TRUE(write_trials(*log, folder / "mm/pushes.csv").ok());
+  const Finished plan =
+      gapfarm_command({"evolve", GAPFARM_SOURCE_DIR "/configs/push.toml", "--trials",
+                       folder / "mm/pushes.csv", "--out", folder / "run", "--dry-run"});
+  EXPECT_EQ(plan.exit_code, 0) << plan.err;
+  EXPECT_NE(plan.err.find("unit_error: "), std::string::npos) << plan.err;
+  EXPECT_NE(plan.err.find("Multiply the positions of pieces and finger by 0.001"),
+            std::string::npos)
+      << plan.err;
 }
 
 }  // namespace gapfarm::diagnose_pushes_test

@@ -57,11 +57,16 @@ std::vector<v1::Task> predict_tasks(const TrialLog& log) {
   return tasks;
 }
 
+Problem problem_with(const Model& model, const TrialLog& log) {
+  Problem problem = problem_of(model);
+  problem.log = shifted(log, -model.frame_x_m, -model.frame_y_m);
+  return problem;
+}
+
 Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const TrialLog& log,
                                                      const PredictOptions& options,
                                                      CliContext& context) {
-  Problem problem = problem_of(model);
-  problem.log = shifted(log, -model.frame_x_m, -model.frame_y_m);
+  Problem problem = problem_with(model, log);
   // Any fitness will do; this one asks nothing of the log.
   problem.fitness.kind = FitnessKind::kLogScore;
   const std::vector<v1::Task> tasks = predict_tasks(log);
@@ -151,6 +156,7 @@ Result<int> run_predict(PredictOptions& options, CliContext& context) {
       const TrialLog log,
       read_trial_files(options.trials.files, command_names(model.commands), options.trials.read));
   show_notes(log, console);
+  if (options.mined.empty()) show_warnings(problem_with(model, log), console);
   options.outputs.reads(log);
   options.outputs.reads(options.model);
   options.outputs.reads((std::filesystem::path(options.model) / "model.toml").string());
