@@ -82,7 +82,9 @@ TEST(PushLog, APushWithoutItsTipsIsARowWithAMistake) {
   ASSERT_FALSE(log.ok());
   EXPECT_THAT(log.error().message, HasSubstr("pushes.csv:2:1: found a push with fewer than two"));
   EXPECT_THAT(log.error().message, HasSubstr("; also in line 4"));
-  const auto rest = read_trial_files({{pushes}}, kPieces, {.skip_invalid = true});
+  ReadOptions skip;
+  skip.skip_invalid = true;
+  const auto rest = read_trial_files({{pushes}}, kPieces, skip);
   ASSERT_TRUE(rest.ok()) << rest.error().message;
   ASSERT_EQ(rest->trials.size(), 1u);
   EXPECT_EQ(rest->trials.front().trial, 1);
