@@ -198,6 +198,10 @@ std::vector<Effect> build_push_catalogue() {
              {real("x", "m", 0, -0.05, 0.05, "in the piece's frame"),
               real("y", "m", 0, -0.05, 0.05, "in the piece's frame")},
              2),
+      camera("frame_offset", kNoContext, "the camera's frame lies beside the finger's",
+             {real("x", "m", 0, -0.05, 0.05, "logged position less the true one, world frame"),
+              real("y", "m", 0, -0.05, 0.05, "same")},
+             2),
   };
 }
 

@@ -76,7 +76,9 @@ inline Values neutral() {
           {"camera_distortion.x", 0},
           {"camera_distortion.y", 0},
           {"marker_offset.x", 0},
-          {"marker_offset.y", 0}};
+          {"marker_offset.y", 0},
+          {"frame_offset.x", 0},
+          {"frame_offset.y", 0}};
 }
 
 struct World {

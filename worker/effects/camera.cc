@@ -136,6 +136,15 @@ constexpr EffectBehaviour kCameraEffects[] = {
          [](EffectValues p, const Pose& X_WM) {
            return X_WM * Pose{-p[0], -p[1], 0};
          }},
+    {.name = "frame_offset",  // p: x, y
+     .observe =
+         [](EffectValues p, const Pose& X_WR) {
+           return Pose{X_WR.x + p[0], X_WR.y + p[1], X_WR.theta};
+         },
+     .recover =
+         [](EffectValues p, const Pose& X_WM) {
+           return Pose{X_WM.x - p[0], X_WM.y - p[1], X_WM.theta};
+         }},
     {.name = "pose_latency",  // p: share, age
      .reading =
          [](EffectValues p, Reading& reading) {

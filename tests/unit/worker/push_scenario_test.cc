@@ -103,6 +103,24 @@ TEST(PushEffects, CameraEffectsActOnBothReadings) {
   }
 }
 
+// Pieces and finger are logged in two frames that lie beside one another.
+TEST(PushEffects, FrameOffsetMovesBothReadingsAndNotTheFinger) {
+  const Problem problem = push_problem();
+  const v1::TaskResult plain = predicted(problem);
+  Problem beside = problem;
+  push_value(beside, "frame_offset.x") = 0.003;
+  push_value(beside, "frame_offset.y") = -0.002;
+  for (Trial& trial : beside.log.trials) {
+    trial.X_WS.x += 0.003;
+    trial.X_WS.y -= 0.002;
+  }
+  const v1::TaskResult result = predicted(beside);
+  for (int i = 0; i < 8; ++i) {
+    EXPECT_NEAR(end_of(result, i).x, end_of(plain, i).x + 0.003, 1e-6);
+    EXPECT_NEAR(end_of(result, i).y, end_of(plain, i).y - 0.002, 1e-6);
+  }
+}
+
 // What influence and stability look at: without noise a trace ends where a prediction does, with
 // it beside, and equal streams give equal traces.
 TEST(PushScenario, TracesThePushOfATrial) {
