@@ -9,7 +9,6 @@
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "common/base/try.h"
-#include "master/ground/put_right.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
 
@@ -211,17 +210,6 @@ GroundQuestion question_of_program(const Problem& problem, const GroundRobot& ro
     question.catalogue.push_back(
         {"command_gain", {"command_units"}, "the gain of " + whose, {gain}});
     question.catalogue.push_back({"command_offset", {}, "what is added to " + whose, {offset}});
-    for (std::size_t k = c + 1; k < channels.size(); ++k) {
-      question.catalogue.push_back({"channels_swapped",
-                                    {"sides_swapped"},
-                                    channels[c] + " and " + channels[k] + " of the commands",
-                                    {},
-                                    change_commands([c, k](std::vector<double>& values) {
-                                      std::swap(values[c], values[k]);
-                                    }),
-                                    1,
-                                    "Swap these two columns of the commands."});
-    }
   }
   // The rows of one value are the same to the digit wherever they stand.
   for (GroundHypothesis& h : question.catalogue) {

@@ -35,13 +35,31 @@ auto swap_commands(ChannelPairs pairs) {
   });
 }
 
+// Of the channels where `of` is set; none of a log in which they are all within `beyond`.
+std::function<void(RunLog*)> scale_commands(const std::vector<bool>& of, double factor,
+                                            double beyond) {
+  return [of, factor, beyond](RunLog* log) {
+    double most = 0;
+    const auto each = [&](const std::function<void(double&)>& visit) {
+      change_commands([&](std::vector<double>& v) {
+        for (std::size_t c = 0; c < v.size(); ++c) {
+          if (of[c]) visit(v[c]);
+        }
+      })(log);
+    };
+    each([&](double& value) { most = std::max(most, std::abs(value)); });
+    if (most > beyond) each([&](double& value) { value *= factor; });
+  };
+}
+
 // `channel`: of those whose names begin so; `alias`: what else makes all motions larger than
-// commanded.
+// commanded; `beyond`: what no command in the right unit exceeds, and some do in this.
 struct CommandUnit {
   CommandKind of;
   const char *channel, *thing, *name;
   double factor;
   const char* alias;
+  double beyond = 0;
 };
 
 constexpr CommandKind kWheels = CommandKind::kWheelSpeeds, kTwists = CommandKind::kTwist,
@@ -56,11 +74,10 @@ constexpr CommandUnit kCommandUnits[] = {
     {kSteered, "speed", "wheel's speed", "rpm", 2 * pi / 60, "wheel_radius"},
     {kSteered, "speed", "wheel's speed", "degrees a second", pi / 180, "wheel_radius"},
     {kSteered, "speed", "wheel's speed", "m/s", kByRadius, "wheel_radius"},
-    {kSteered, "steering", "steering", "degrees", pi / 180, "steering_gain"},
-    {kSteered, "steering", "steering", "per cent", 0.01, "steering_gain"},
-    {kThrottled, "throttle", "throttle", "per cent", 0.01, "throttle_gain"},
-    {kThrottled, "steering", "steering", "per cent", 0.01, "steering_gain"},
-    {CommandKind::kDuties, "", "duties", "per cent", 0.01, "speed_gain"},
+    {kSteered, "steering", "steering", "degrees", pi / 180, "steering_gain", pi / 2},
+    {kThrottled, "throttle", "throttle", "per cent", 0.01, "throttle_gain", 1},
+    {kThrottled, "steering", "steering", "per cent", 0.01, "steering_gain", 1},
+    {CommandKind::kDuties, "", "duties", "per cent", 0.01, "speed_gain", 1},
     {kTwists, "v", "commanded speeds", "km/h", 1 / 3.6, "pose_scale"},
     {kTwists, "v", "commanded speeds", "cm/s", 1e-2, "pose_scale"},
     {kTwists, "v", "commanded speeds", "mm/s", 1e-3, "pose_scale"},
@@ -84,20 +101,19 @@ void Catalogue::wrong_commands() {
   }
   // A robot of wheels that push it several ways has a column for each.
   const bool one_a_wheel = is_holonomic(robot_) && robot_.command != kTwists;
-  for (std::size_t c = 0; one_a_wheel && c < robot_.channels.size(); ++c) {
+  for (std::size_t c = 0; c < robot_.channels.size(); ++c) {
     const std::string& channel = robot_.channels[c];
-    fault("side_reversed", {"command_sign"}, "the sign of " + channel,
-          "Turn the sign of that column.",
-          change_commands([c](std::vector<double>& v) { v[c] *= -1; }));
+    if (one_a_wheel) {
+      fault("side_reversed", {"command_sign"}, "the sign of " + channel,
+            "Turn the sign of that column.",
+            change_commands([c](std::vector<double>& v) { v[c] *= -1; }));
+    }
     for (std::size_t d = c + 1; d < robot_.channels.size(); ++d) {
-      fault("wheels_swapped", {"sides_swapped"},
-            channel + " and " + robot_.channels[d] + " of the commands", "Swap their columns.",
+      if (!one_a_wheel && !pairs.empty()) continue;
+      fault("channels_swapped", {"sides_swapped"},
+            channel + " and " + robot_.channels[d] + " of the commands", "Swap these two columns.",
             swap_commands({{c, d}}));
     }
-  }
-  if (!one_a_wheel && pairs.empty() && robot_.channels.size() == 2) {
-    fault("commands_swapped", {}, robot_.channels[0] + " and " + robot_.channels[1],
-          "Swap their columns.", swap_commands({{0, 1}}));
   }
   fault("command_reversed", {"command_sign"}, "the sign of every command",
         "Turn the sign of the commands.", change_commands([](std::vector<double>& v) {
@@ -128,9 +144,7 @@ void Catalogue::wrong_commands() {
     fault("unit_error", {"command_units", unit.alias},
           std::string("the unit of the ") + unit.thing + ": " + unit.name,
           "Multiply them by " + std::to_string(factor) + ".",
-          change_commands([factor, of_it](std::vector<double>& v) {
-            for (std::size_t c = 0; c < v.size(); ++c) v[c] *= of_it[c] ? factor : 1;
-          }));
+          scale_commands(of_it, factor, unit.beyond));
   }
 }
 

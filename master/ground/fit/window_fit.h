@@ -143,8 +143,8 @@ class WindowFitter {
   // best: a battery, what rollers picked up.
   WindowFit within_runs(WindowFit fit) const;
 
-  // Of the prior of these rows, whose middle are their nominals; what the reference leaves open is in
-  // it.
+  // Of the prior of these rows, whose middle are their nominals; with what the reference leaves
+  // open.
   Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
 
   // A fit's residuals as they are: m, m, rad.

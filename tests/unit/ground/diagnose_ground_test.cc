@@ -198,7 +198,7 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
 
 TEST(DiagnoseGround, FindsColumnsOfWheelsThatAreAnothersOrReversed) {
   const GroundRobot robot = robot_of(kOmni);
-  for (const char* fault : {"wheels_swapped", "side_reversed"}) {
+  for (const char* fault : {"channels_swapped", "side_reversed"}) {
     RunLog log = driven(robot, {});
     for (LoggedRun& run : log.runs) {
       for (CommandRow& row : run.commands) {
