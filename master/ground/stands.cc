@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base/ranges.h"
-#include "master/ground/fit/held_out.h"
 #include "master/ground/report/ground_text.h"
 
 namespace gapfarm {
@@ -30,15 +28,11 @@ bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const Gr
     hypothesis.describe(fitter, fit, work.seed, &effect);
     return shows(effect.parameters.front());
   }
-  return std::ranges::any_of(
-      derived_estimates(fitter, fit, work.seed,
-                        [&](const Eigen::VectorXd& values) {
-                          return mapped(hypothesis.freed, [&](const KinematicRow& row) {
-                            const double value = values[row_index(fit.rows, row.name)];
-                            return Estimate{row.key, value - row.nominal, 0, 0, row.unit};
-                          });
-                        }),
-      shows);
+  const Eigen::MatrixX2d intervals = fitter.intervals(fit, work.seed);
+  return std::ranges::any_of(hypothesis.freed, [&](const KinematicRow& row) {
+    const Eigen::Index i = row_index(fit.rows, row.name);
+    return shows({row.key, 0, intervals(i, 0) - row.nominal, intervals(i, 1) - row.nominal, ""});
+  });
 }
 
 WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,
