@@ -130,7 +130,7 @@ Interval wilson_interval(std::size_t successes, std::size_t trials, double cover
   const double centre = (share + z * z / (2 * n)) / (1 + z * z / n);
   const double half =
       z / (1 + z * z / n) * std::sqrt(share * (1 - share) / n + z * z / (4 * n * n));
-  return {std::max(0.0, centre - half), std::min(1.0, centre + half)};
+  return {successes == 0 ? 0 : centre - half, successes == trials ? 1 : centre + half};
 }
 
 }  // namespace gapfarm

@@ -168,7 +168,7 @@ Status add_realised(const Config& config, const BlindCheckSettings& settings,
 
 ScoredCase scored(const Truth& truth, const CheckPaths& paths) {
   ChildEnd end = read_outcome(paths.outcome(truth.id));
-  std::optional<Reported> reported = read_reported(paths.diagnosis(truth.id), end);
+  std::optional<Diagnosis> reported = read_reported(paths.diagnosis(truth.id), end);
   return score_case(truth, end, std::move(reported));
 }
 

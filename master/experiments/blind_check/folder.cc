@@ -8,6 +8,7 @@
 #include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/result/diagnosis_json.h"
 
 namespace gapfarm {
 namespace {
@@ -131,15 +132,20 @@ ChildEnd read_outcome(const std::string& path) {
   return end;
 }
 
-std::optional<Reported> read_reported(const std::string& folder, ChildEnd& end) {
+std::optional<Diagnosis> read_reported(const std::string& folder, ChildEnd& end) {
   if (end.state != ChildState::kDone) return std::nullopt;
-  const std::string path = folder + "/diagnosis.json";
-  const Result<std::string> text = read_text_file(path);
-  const Result<Reported> reported =
-      text ? parse_reported(*text, path) : Result<Reported>(text.error());
-  if (reported) return *reported;
-  end.text = "left no readable diagnosis (" + reported.error().message + ")";
-  return std::nullopt;
+  const Result<std::string> text = read_text_file(folder + "/diagnosis.json");
+  Result<Diagnosis> reported = text ? parse_diagnosis(*text) : text.error();
+  if (reported && reported->verdict == Verdict::kUnusable) {
+    reported = Error{"its log is unusable"};
+  }
+  if (!reported) {
+    end.text = "left no readable diagnosis (" + reported.error().message + ")";
+    return std::nullopt;
+  }
+  reported->trials.clear();  // of hundreds of cases, and nobody asks for them
+  reported->drives.clear();
+  return std::move(*reported);
 }
 
 }  // namespace gapfarm

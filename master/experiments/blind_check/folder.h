@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "master/diagnose/result/diagnosis.h"
 #include "master/experiments/blind_check/blind_check.h"
 
 namespace gapfarm {
@@ -49,6 +50,6 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
 ChildEnd read_outcome(const std::string& path);
 
 // What it reported; none when it did not end well or left nothing readable, which `end` then shows.
-std::optional<Reported> read_reported(const std::string& folder, ChildEnd& end);
+std::optional<Diagnosis> read_reported(const std::string& folder, ChildEnd& end);
 
 }  // namespace gapfarm

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/json/json.h"
 #include "master/diagnose/effect_diagnosis.h"
 
 namespace gapfarm {
@@ -16,60 +15,31 @@ namespace {
 
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
-double number_at(const Json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? found->get<double>() : kAbsent;
-}
-
-ReportedEffect reported_effect(const Json& json) {
-  ReportedEffect effect;
-  effect.name = json["name"].get<std::string>();
-  const Json aliases = json.value("aliases", Json::array());
-  for (const Json& alias : aliases) {
-    if (alias.is_string()) effect.aliases.push_back(alias.get<std::string>());
-  }
-  effect.confidence = number_at(json, "confidence");
-  effect.closed = number_at(json, "closed");
-  const Json parameters = json.value("parameters", Json::object());
-  if (!parameters.is_object()) return effect;
-  for (const auto& [key, value] : parameters.items()) {
-    if (!value.is_object()) continue;
-    const ReportedParameter p{key,
-                              number_at(value, "value"),
-                              number_at(value, "lo"),
-                              number_at(value, "hi"),
-                              number_at(value, "sd"),
-                              number_at(value, "bound")};
-    if (std::isfinite(p.lo) && std::isfinite(p.hi)) effect.parameters.push_back(p);
-  }
-  return effect;
-}
-
 using Family = std::set<std::string>;
 
-Family family_of(const ReportedEffect& effect) {
+Family family_of(const NamedEffect& effect) {
   Family family = {effect.name};
   const std::size_t count = std::min(effect.aliases.size(), kMaxAliases);
   family.insert(effect.aliases.begin(), effect.aliases.begin() + static_cast<long>(count));
   return family;
 }
 
-std::string names_of(const Reported& reported) {
-  std::string text = joined(reported.effects, "+", &ReportedEffect::name);
-  return text.empty() ? reported.verdict : reported.verdict + " " + text;
+std::string names_of(const Diagnosis& diagnosis) {
+  std::string text = joined(diagnosis.effects, "+", &NamedEffect::name);
+  return verdict_name(diagnosis.verdict) + (text.empty() ? "" : " " + text);
 }
 
 std::string names_of(const Truth& truth) { return joined(truth.effects, "+", &TrueEffect::name); }
 
-Judgement judge_effects(const Truth& truth, const Reported& reported) {
+Judgement judge_effects(const Truth& truth, const Diagnosis& diagnosis) {
   const std::string what = names_of(truth);
-  if (reported.verdict != "effect" && reported.verdict != "effect+unknown") {
-    return {false, what + "; reported " + reported.verdict};
+  if (diagnosis.verdict != Verdict::kEffect && diagnosis.verdict != Verdict::kEffectAndUnknown) {
+    return {false, what + "; reported " + verdict_name(diagnosis.verdict)};
   }
-  std::vector<ReportedEffect> left = reported.effects;
+  std::vector<NamedEffect> left = diagnosis.effects;
   // By name first: one name may be another one's alias, and be there beside it.
   const auto hit_by = [&](const TrueEffect& effect, bool by_alias) {
-    return std::ranges::find_if(left, [&](const ReportedEffect& one) {
+    return std::ranges::find_if(left, [&](const NamedEffect& one) {
       return by_alias ? family_of(one).count(effect.name) > 0 : one.name == effect.name;
     });
   };
@@ -82,16 +52,16 @@ Judgement judge_effects(const Truth& truth, const Reported& reported) {
   for (const TrueEffect& effect : others) {
     const auto hit = hit_by(effect, true);
     if (hit == left.end()) {
-      return {false, what + "; missed " + effect.name + ", reported " + names_of(reported)};
+      return {false, what + "; missed " + effect.name + ", reported " + names_of(diagnosis)};
     }
     left.erase(hit);
   }
   if (truth.effects.size() == 1 &&
-      family_of(reported.effects.front()).count(truth.effects.front().name) == 0) {
-    return {false, what + "; named after " + reported.effects.front().name};
+      family_of(diagnosis.effects.front()).count(truth.effects.front().name) == 0) {
+    return {false, what + "; named after " + diagnosis.effects.front().name};
   }
-  if (!left.empty()) return {false, what + "; also reported more: " + names_of(reported)};
-  return {true, what + "; reported " + names_of(reported)};
+  if (!left.empty()) return {false, what + "; also reported more: " + names_of(diagnosis)};
+  return {true, what + "; reported " + names_of(diagnosis)};
 }
 
 // Strengths all neutral: places and directions mean nothing.
@@ -134,85 +104,59 @@ std::map<std::string, double> as_reported(const TrueEffect& effect) {
 
 }  // namespace
 
-Result<Reported> parse_reported(const std::string& text, const std::string& file) {
-  const Json json = parse_json(text);
-  if (!json.is_object()) return Error{file + ": is not a JSON object, expected a diagnosis"};
-  static constexpr const char* kVerdicts[] = {"effect", "none", "unknown", "effect+unknown"};
-  const Json verdict = json.value("verdict", Json());
-  if (std::find(std::begin(kVerdicts), std::end(kVerdicts), verdict) == std::end(kVerdicts)) {
-    return Error{file + ": \"verdict\" is " + json_text(verdict) +
-                 ", expected \"effect\", \"none\", \"unknown\" or \"effect+unknown\""};
-  }
-  Reported reported;
-  reported.verdict = verdict.get<std::string>();
-  const Json effects = json.value("effects", Json::array());
-  for (const Json& effect : effects) {
-    if (!effect.is_object() || !effect.value("name", Json()).is_string()) {
-      return Error{file + ": \"effects\" holds " + json_text(effect) +
-                   ", expected objects with a name"};
-    }
-    reported.effects.push_back(reported_effect(effect));
-  }
-  for (const Json& row : json.value("screening", Json::array())) {
-    if (!row.is_object() || !row.value("detectable_from", Json()).is_object()) continue;
-    const std::string effect = row.value("effect", std::string());
-    for (const auto& [key, size] : row["detectable_from"].items()) {
-      if (size.is_number()) reported.detectable_from[effect + "." + key] = size.get<double>();
-    }
-  }
-  return reported;
-}
-
-std::optional<bool> missed_below(const Truth& truth, const Reported& reported) {
+std::optional<bool> missed_below(const Truth& truth, const Diagnosis& diagnosis) {
   std::optional<bool> below;
   for (const TrueEffect& effect : truth.effects) {
-    const bool named = std::ranges::any_of(reported.effects, [&](const ReportedEffect& one) {
+    const bool named = std::ranges::any_of(diagnosis.effects, [&](const NamedEffect& one) {
       return family_of(one).count(effect.name) > 0;
     });
     const Effect* entry = catalogue_entry(effect.name);
-    if (named || !entry || truth.kind == CaseKind::kOutside) continue;
+    const auto* screened = find_by(diagnosis.screening, effect.name, &Screened::effect);
+    if (named || !entry || !screened || truth.kind == CaseKind::kOutside) continue;
     for (std::size_t i = 0; i < entry->strengths; ++i) {
       const Parameter& p = entry->parameters[i];
       const auto value = effect.parameters.find(p.key);
-      const auto from = reported.detectable_from.find(effect.name + "." + p.key);
-      if (value == effect.parameters.end() || from == reported.detectable_from.end()) continue;
+      const auto* from = find_by(screened->detectable_from, p.key, [](auto& f) { return f.first; });
+      if (value == effect.parameters.end() || !from || !std::isfinite(from->second)) continue;
       below = below.value_or(true) && std::abs(value->second - p.nominal) < from->second;
     }
   }
   return below;
 }
 
-Judgement judge(const Truth& truth, const Reported& reported) {
-  for (const ReportedEffect& effect : reported.effects) {
+Judgement judge(const Truth& truth, const Diagnosis& diagnosis) {
+  for (const NamedEffect& effect : diagnosis.effects) {
     if (effect.aliases.size() > kMaxAliases) {
       return {false, "more than " + std::to_string(kMaxAliases) + " aliases say nothing"};
     }
   }
   switch (truth.kind) {
     case CaseKind::kNull:
-      return {reported.verdict == "none" && reported.effects.empty(),
-              "null; reported " + names_of(reported)};
+      return {diagnosis.verdict == Verdict::kNone && diagnosis.effects.empty(),
+              "null; reported " + names_of(diagnosis)};
     case CaseKind::kOutside:
-      return {(reported.verdict == "unknown" || reported.verdict == "effect+unknown") &&
-                  reported.effects.empty(),
-              "outside the catalogue; reported " + names_of(reported)};
+      return {(diagnosis.verdict == Verdict::kUnknown ||
+               diagnosis.verdict == Verdict::kEffectAndUnknown) &&
+                  diagnosis.effects.empty(),
+              "outside the catalogue; reported " + names_of(diagnosis)};
     case CaseKind::kSingle:
     case CaseKind::kPair:
       break;
   }
-  return judge_effects(truth, reported);
+  return judge_effects(truth, diagnosis);
 }
 
-std::string first_reported(const Reported& reported) {
-  return reported.effects.empty() ? reported.verdict : reported.effects.front().name;
+std::string first_reported(const Diagnosis& diagnosis) {
+  return diagnosis.effects.empty() ? verdict_name(diagnosis.verdict)
+                                   : diagnosis.effects.front().name;
 }
 
-std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) {
+std::vector<Coverage> coverage_of(const Truth& truth, const Diagnosis& diagnosis) {
   std::vector<Coverage> all;
   for (const TrueEffect& effect : truth.effects) {
-    const auto named = std::ranges::find(reported.effects, effect.name, &ReportedEffect::name);
+    const auto named = std::ranges::find(diagnosis.effects, effect.name, &NamedEffect::name);
     const Effect* entry = catalogue_entry(effect.name);
-    if (named == reported.effects.end() || !entry) continue;
+    if (named == diagnosis.effects.end() || !entry) continue;
     const bool neutral = does_nothing(*entry, effect);
     const std::map<std::string, double> stated = as_reported(effect);
     for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
@@ -222,17 +166,17 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) 
       if (neutral && i >= entry->strengths) continue;
       Coverage coverage{effect.name, p.key, value->second, kAbsent, kAbsent, false};
       coverage.is_strength = i < entry->strengths;
-      for (const ReportedParameter& s : named->parameters) {
-        if (s.key != p.key) continue;
+      for (const Estimate& s : named->parameters) {
+        if (s.key != p.key || !std::isfinite(s.lo) || !std::isfinite(s.hi)) continue;
         coverage.lo = s.lo;
         coverage.hi = s.hi;
         // A direction's bounds are a whole turn of it apart.
         const double turn = p.key == "direction" ? p.upper - p.lower : 0;
         coverage.covered = holds(s.lo, s.hi, value->second, turn);
-        if (!(s.sd > 0)) continue;
-        const double half = kNormal90 * s.sd;
+        if (!s.sd || !(*s.sd > 0)) continue;
+        const double half = kNormal90 * *s.sd;
         coverage.covered_by_fit = holds(s.value - half, s.value + half, value->second, turn);
-        if (s.bound > 0) coverage.fit_over_bound = s.sd / s.bound;
+        if (s.bound && *s.bound > 0) coverage.fit_over_bound = *s.sd / *s.bound;
       }
       all.push_back(coverage);
     }
@@ -240,22 +184,10 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) 
   return all;
 }
 
-double promised_shrinkage(const Reported& reported) {
+double promised_shrinkage(const Diagnosis& diagnosis) {
   double sum = 0;
-  for (const ReportedEffect& effect : reported.effects) sum += effect.closed;
+  for (const NamedEffect& effect : diagnosis.effects) sum += effect.closed;
   return sum;
-}
-
-Interval wilson_interval(const Rate& rate) {
-  if (rate.total == 0) return {0, 1};
-  constexpr double z = 1.959964;  // of the normal law's middle 95 %
-  const double n = rate.total;
-  const double p = rate.share();
-  const double z2 = z * z;
-  const double centre = (p + z2 / (2 * n)) / (1 + z2 / n);
-  const double half = z / (1 + z2 / n) * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
-  return {rate.hits == 0 ? 0 : std::max(0.0, centre - half),
-          rate.hits == rate.total ? 1 : std::min(1.0, centre + half)};
 }
 
 }  // namespace gapfarm

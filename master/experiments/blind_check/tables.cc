@@ -9,6 +9,7 @@
 #include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
+#include "common/math/rank_tests.h"
 
 namespace gapfarm {
 namespace {
@@ -57,7 +58,7 @@ std::vector<RateRow> rate_rows(const Tally& sum) {
 
 std::string percent(const Rate& rate) {
   if (rate.total == 0) return "-";
-  const Interval i = wilson_interval(rate);
+  const Interval i = wilson_interval(rate.hits, rate.total, 0.95);
   return formatted("%.0f %% [%.0f, %.0f]", 100 * rate.share(), 100 * i.lower, 100 * i.upper);
 }
 
@@ -72,7 +73,7 @@ std::string share(const std::optional<double>& value) {
 }
 
 Json rate_json(const Rate& rate) {
-  const Interval i = wilson_interval(rate);
+  const Interval i = wilson_interval(rate.hits, rate.total, 0.95);
   Json json = {{"hits", rate.hits}, {"total", rate.total}};
   if (rate.total > 0) {
     json["share"] = rate.share();
@@ -88,11 +89,11 @@ Json rates_json(const std::map<std::string, Rate>& rates) {
   return json;
 }
 
-Json reported_json(const Reported& reported) {
-  Json effects = mapped(reported.effects, [&](const ReportedEffect& e) -> Json {
+Json reported_json(const Diagnosis& diagnosis) {
+  Json effects = mapped(diagnosis.effects, [&](const NamedEffect& e) -> Json {
     return {{"name", e.name}, {"aliases", e.aliases}};
   });
-  return {{"verdict", reported.verdict}, {"effects", effects}};
+  return {{"verdict", verdict_name(diagnosis.verdict)}, {"effects", effects}};
 }
 
 Json case_json(const ScoredCase& c) {
@@ -202,8 +203,8 @@ std::string effects_text(const Truth& truth) {
 
 std::string reported_text(const ScoredCase& c) {
   if (!c.reported) return c.end.text.empty() ? "no diagnosis" : c.end.text;
-  std::string text = c.reported->verdict;
-  for (const ReportedEffect& e : c.reported->effects) {
+  std::string text = verdict_name(c.reported->verdict);
+  for (const NamedEffect& e : c.reported->effects) {
     text += " " + e.name;
     if (!e.aliases.empty()) text += " (or " + joined(e.aliases) + ")";
   }

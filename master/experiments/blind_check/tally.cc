@@ -122,7 +122,7 @@ std::optional<bool> closes_half(const FreshScores& scores) {
   return scores.corrected.value_or(scores.final_) - scores.tuned >= *gap / 2;
 }
 
-ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Reported> reported) {
+ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Diagnosis> reported) {
   ScoredCase scored;
   scored.truth = truth;
   scored.end = end;

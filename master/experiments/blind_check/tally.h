@@ -35,7 +35,7 @@ struct ScoredCase {
   Truth truth;  // foreign cases without a truth: the id alone
   bool has_truth = true;
   ChildEnd end;
-  std::optional<Reported> reported;  // none: the diagnosis failed
+  std::optional<Diagnosis> reported;  // none: the diagnosis failed
   Judgement judgement;
   std::vector<Coverage> coverage;
   std::optional<double> promised;  // of named effects only
@@ -44,7 +44,7 @@ struct ScoredCase {
 };
 
 // Judges a case; a diagnosis that failed is wrong.
-ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Reported> reported);
+ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Diagnosis> reported);
 
 constexpr double kPromiseTolerance = 0.1;
 constexpr double kNearBound[] = {0.9, 1.3};  // of a fit's width, in those of the bound

@@ -11,6 +11,7 @@
 #include "common/config/model.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
+#include "master/diagnose/result/diagnosis_json.h"
 #include "tests/unit/blind/worker_farm.h"
 
 namespace gapfarm::blind_check_test {
@@ -39,11 +40,11 @@ class BlindCheck : public ::testing::Test {
   }
 
   // $1 CONFIG, $3 trials, $5 out; every run leaves a line in runs.txt.
-  void fake_diagnose(const std::string& answer, const std::string& before = "") {
+  void fake_diagnose(const Diagnosis& answer, const std::string& before = "") {
     const std::string script =
         "#!/bin/sh\necho \"$5 $*\" >> " + (folder_ / "runs.txt") + "\n" + before + "\ncp " +
         (folder_ / "model.toml") + " $5/model.toml\ncp " + (folder_ / "tuned.toml") +
-        " $5/tuned.toml\ncat > $5/diagnosis.json" + " <<'END'\n" + answer + "\nEND\n";
+        " $5/tuned.toml\ncat > $5/diagnosis.json" + " <<'END'\n" + to_json(answer) + "END\n";
     ASSERT_TRUE(write_file_atomically(folder_ / "diagnose.sh", script).ok());
     settings_.diagnose.command = {"/bin/sh", folder_ / "diagnose.sh"};
   }
@@ -64,13 +65,23 @@ class BlindCheck : public ::testing::Test {
   StopSource stop_;
 };
 
-constexpr const char* kNone = R"({"verdict": "none", "effects": []})";
-constexpr const char* kAsymmetry =
-    R"({"verdict": "effect", "effects": [{"name": "motor_asymmetry", "closed": 0.9,
-        "parameters": {"ratio": {"value": 0, "lo": -1, "hi": 1}}}]})";
+Diagnosis with_verdict(Verdict verdict) {
+  Diagnosis diagnosis;
+  diagnosis.verdict = verdict;
+  return diagnosis;
+}
+
+Diagnosis asymmetry() {
+  Diagnosis diagnosis = with_verdict(Verdict::kEffect);
+  NamedEffect& effect = diagnosis.effects.emplace_back();
+  effect.name = "motor_asymmetry";
+  effect.closed = 0.9;
+  effect.parameters = {{"ratio", 0, -1, 1, "-"}};
+  return diagnosis;
+}
 
 TEST_F(BlindCheck, ScoresWhatTheDiagnosesReport) {
-  fake_diagnose(kAsymmetry, "ls -a \"$(dirname $3)\" > $5/seen.txt");
+  fake_diagnose(asymmetry(), "ls -a \"$(dirname $3)\" > $5/seen.txt");
   const auto report = run();
   ASSERT_TRUE(report.ok()) << report.error().message;
   ASSERT_EQ(report->cases.size(), 5u);  // two singles, a null, a pair, a omitted effect
@@ -114,7 +125,7 @@ TEST_F(BlindCheck, AnEffectThatWasHeldOutIsScoredWithItsResidual) {
   ahead.weights = {{"", Eigen::RowVector3d(0.05, 0, 0)}};
   model.residual.field = {ahead};
   ASSERT_TRUE(write_model(model, folder_ / "model.toml").ok());
-  fake_diagnose(R"({"verdict": "unknown", "effects": []})");
+  fake_diagnose(with_verdict(Verdict::kUnknown));
   settings_.design.effects = {"motor_asymmetry"};
   settings_.design.nulls = settings_.design.pairs = 0;
   const auto report = run();
@@ -132,17 +143,17 @@ TEST_F(BlindCheck, AnEffectThatWasHeldOutIsScoredWithItsResidual) {
 }
 
 TEST_F(BlindCheck, TruthsAreSealedWhileDiagnosesRun) {
-  fake_diagnose(kNone, "test -e " + settings_.out + "/seals.txt && test ! -e " + settings_.out +
-                           "/truth && test ! -e " + settings_.out +
-                           ".key && ! grep -rq asymmetry " + settings_.out + "/cases " +
-                           settings_.out + "/truths.box || exit 9");
+  fake_diagnose(with_verdict(Verdict::kNone),
+                "test -e " + settings_.out + "/seals.txt && test ! -e " + settings_.out +
+                    "/truth && test ! -e " + settings_.out + ".key && ! grep -rq asymmetry " +
+                    settings_.out + "/cases " + settings_.out + "/truths.box || exit 9");
   const auto report = run();
   ASSERT_TRUE(report.ok()) << report.error().message;
   for (const ScoredCase& c : report->cases) EXPECT_EQ(c.end.state, ChildState::kDone);
 }
 
 TEST_F(BlindCheck, ACrashIsACountedOutcome) {
-  fake_diagnose(kNone, "kill -SEGV $$");
+  fake_diagnose(with_verdict(Verdict::kNone), "kill -SEGV $$");
   settings_.design.pairs = settings_.design.excluded = 0;
   const auto report = run();
   ASSERT_TRUE(report.ok()) << report.error().message;
@@ -153,7 +164,7 @@ TEST_F(BlindCheck, ACrashIsACountedOutcome) {
 }
 
 TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
-  fake_diagnose(kNone);
+  fake_diagnose(with_verdict(Verdict::kNone));
   hooks_.progress = [this](const std::string& what, std::size_t done, std::size_t) {
     if (what == "cases diagnosed" && done == 2) stop_.request();
   };
@@ -186,7 +197,7 @@ TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
 }
 
 TEST_F(BlindCheck, ResumeRefusesWhatWasTamperedWith) {
-  fake_diagnose(kNone);
+  fake_diagnose(with_verdict(Verdict::kNone));
   settings_.design.effects = {"motor_asymmetry"};
   settings_.design.pairs = settings_.design.excluded = 0;
   ASSERT_TRUE(run().ok());
@@ -206,7 +217,7 @@ TEST_F(BlindCheck, ResumeRefusesWhatWasTamperedWith) {
 }
 
 TEST_F(BlindCheck, RunsOnForeignCases) {
-  fake_diagnose(kAsymmetry);
+  fake_diagnose(asymmetry());
   for (const char* id : {"case01", "case02", "case03"}) {
     ASSERT_TRUE(
         write_file_atomically(folder_ / ("f/" + std::string(id) + "/trials.csv"), "x").ok());

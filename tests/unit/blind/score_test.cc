@@ -5,10 +5,11 @@
 
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "common/trials/files.h"
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/experiments/blind_check/folder.h"
 #include "tests/unit/blind/worker_farm.h"
 
 namespace gapfarm::score_test {
@@ -126,17 +127,22 @@ Truth truth_of(const JudgeRow& row) {
   return truth;
 }
 
-std::string reported_text(const JudgeRow& row) {
-  nlohmann::json effects = nlohmann::json::array();
-  for (const Named& n : row.named) effects.push_back({{"name", n.name}, {"aliases", n.aliases}});
-  return nlohmann::json{{"verdict", row.verdict}, {"effects", effects}}.dump();
+Diagnosis reported_of(const JudgeRow& row) {
+  Diagnosis diagnosis;
+  for (const Verdict verdict :
+       {Verdict::kEffect, Verdict::kNone, Verdict::kUnknown, Verdict::kEffectAndUnknown}) {
+    if (row.verdict == verdict_name(verdict)) diagnosis.verdict = verdict;
+  }
+  for (const Named& n : row.named) {
+    diagnosis.effects.emplace_back().name = n.name;
+    diagnosis.effects.back().aliases = n.aliases;
+  }
+  return diagnosis;
 }
 
 TEST(Judge, KeepsTheRules) {
   for (const JudgeRow& row : judge_rows()) {
-    const auto reported = parse_reported(reported_text(row), "diagnosis.json");
-    ASSERT_TRUE(reported.ok()) << row.what;
-    EXPECT_EQ(judge(truth_of(row), *reported).right, row.right) << row.what;
+    EXPECT_EQ(judge(truth_of(row), reported_of(row)).right, row.right) << row.what;
   }
 }
 
@@ -150,15 +156,19 @@ TEST(Judge, AgreesWithTheReferenceScorer) {
   const TemporaryFolder folder;
   for (const JudgeRow& row : judge_rows()) {
     ASSERT_TRUE(write_file_atomically(folder / "t.json", format_truth(truth_of(row))).ok());
-    ASSERT_TRUE(write_file_atomically(folder / "d.json", reported_text(row)).ok());
+    ASSERT_TRUE(write_file_atomically(folder / "d.json", to_json(reported_of(row))).ok());
     const std::string command = "python3 '" + scorer.string() + "' '" + (folder / "t.json") +
                                 "' '" + (folder / "d.json") + "' >/dev/null 2>&1";
     EXPECT_EQ(std::system(command.c_str()) == 0, row.right) << row.what;
   }
 }
 
-Reported reported_with(const std::string& effect, std::vector<ReportedParameter> parameters) {
-  return {"effect", {{effect, {}, 1, std::move(parameters), 0.8}}};
+Diagnosis reported_with(const std::string& effect, std::vector<Estimate> parameters) {
+  Diagnosis diagnosis;
+  diagnosis.verdict = Verdict::kEffect;
+  diagnosis.effects.emplace_back().name = effect;
+  diagnosis.effects.back().parameters = std::move(parameters);
+  return diagnosis;
 }
 
 TEST(Coverage, ComparesAnglesOnTheCircle) {
@@ -167,8 +177,9 @@ TEST(Coverage, ComparesAnglesOnTheCircle) {
   truth.kind = CaseKind::kSingle;
   truth.effects = {{"floor_tilt", {{"angle", 0.05}, {"direction", -kPi + 0.1}}, 5}};
   const auto covered = [&](double lo, double hi) {
-    const auto all = coverage_of(truth, reported_with("floor_tilt", {{"angle", 0.05, 0.04, 0.06},
-                                                                     {"direction", 0, lo, hi}}));
+    const auto all =
+        coverage_of(truth, reported_with("floor_tilt", {{"angle", 0.05, 0.04, 0.06, "rad"},
+                                                        {"direction", 0, lo, hi, "rad"}}));
     EXPECT_EQ(all.size(), 2u);
     EXPECT_TRUE(all[0].covered);
     EXPECT_TRUE(all[0].is_strength);
@@ -192,7 +203,7 @@ TEST(Coverage, CountsMissingIntervalsAndSkipsWhatMeansNothing) {
                      {"position", 1},
                      {"axis", 1}},
                     5}};
-  auto all = coverage_of(truth, reported_with("camera_seam", {{"offset_x", 0.01, 0.0, 0.02}}));
+  auto all = coverage_of(truth, reported_with("camera_seam", {{"offset_x", 0.01, 0.0, 0.02, "m"}}));
   EXPECT_EQ(all.size(), 5u);  // no interval of a choice
   EXPECT_TRUE(all[0].covered);
   EXPECT_FALSE(all[1].covered);
@@ -208,8 +219,8 @@ TEST(Coverage, CountsFitsByThemselves) {
   truth.kind = CaseKind::kSingle;
   truth.effects = {{"motor_asymmetry", {{"ratio", 0.06}}, 5}};
   const auto of = [&](double sd) {
-    return coverage_of(truth,
-                       reported_with("motor_asymmetry", {{"ratio", 0.05, 0.03, 0.07, sd, 0.004}}))
+    return coverage_of(truth, reported_with("motor_asymmetry",
+                                            {{"ratio", 0.05, 0.03, 0.07, "", 0.004, {}, sd}}))
         .front();
   };
   EXPECT_EQ(of(0.005).covered_by_fit, false);
@@ -219,9 +230,11 @@ TEST(Coverage, CountsFitsByThemselves) {
 }
 
 TEST(MissedBelow, IsWhatTheLogCouldNotShow) {
-  const Reported none = *parse_reported(R"({"verdict": "none", "screening": [
-          {"effect": "floor_tilt", "detectable_from": {"angle": 0.02}}, {"effect": "backlash"}]})",
-                                        "d");
+  Diagnosis none;
+  none.screening.resize(2);
+  none.screening[0].effect = "floor_tilt";
+  none.screening[0].detectable_from = {{"angle", 0.02}};
+  none.screening[1].effect = "backlash";
   Truth truth;
   truth.kind = CaseKind::kSingle;
   truth.effects = {{"floor_tilt", {{"angle", 0.01}, {"direction", 1}}, 5}};
@@ -233,27 +246,20 @@ TEST(MissedBelow, IsWhatTheLogCouldNotShow) {
   EXPECT_EQ(missed_below(truth, none), std::nullopt);  // of which nothing is known
 }
 
-TEST(Wilson, MatchesTheClosedForm) {
-  const Interval half = wilson_interval({50, 100});
-  EXPECT_NEAR(half.lower, 0.4038, 1e-4);
-  EXPECT_NEAR(half.upper, 0.5962, 1e-4);
-  const Interval all = wilson_interval({60, 60});
-  EXPECT_NEAR(all.lower, 60 / (60 + 1.959964 * 1.959964), 1e-9);
-  EXPECT_EQ(all.upper, 1);
-  EXPECT_EQ(wilson_interval({0, 10}).lower, 0);
-  EXPECT_EQ(wilson_interval({}).upper, 1);
-}
-
-TEST(Reported, NamesWhatIsWrong) {
-  EXPECT_FALSE(parse_reported("[]", "d").ok());
-  EXPECT_FALSE(parse_reported(R"({"verdict": "maybe"})", "d").ok());
-  EXPECT_FALSE(parse_reported(R"({"verdict": "effect", "effects": [{}]})", "d").ok());
-  const auto reported = parse_reported(R"({"verdict": "effect", "effects": [{"name": "backlash",
-      "parameters": {"travel": {"value": 1, "lo": 0, "hi": 2}, "odd": {"value": "x"}}}]})",
-                                       "d");
-  ASSERT_TRUE(reported.ok());
-  EXPECT_EQ(reported->effects[0].parameters.size(), 1u);
-  EXPECT_TRUE(std::isnan(promised_shrinkage(*reported)));
+TEST(Reported, AnUnusableLogOrFileIsAFailedCase) {
+  const TemporaryFolder folder;
+  Diagnosis diagnosis;
+  const auto reported = [&](const std::string& text) {
+    EXPECT_TRUE(write_file_atomically(folder / "diagnosis.json", text).ok());
+    ChildEnd end;
+    const bool is_read = read_reported(folder / "", end).has_value();
+    EXPECT_EQ(is_read, end.text.empty());
+    return end.text;
+  };
+  EXPECT_EQ(reported(to_json(diagnosis)), "");
+  EXPECT_NE(reported(R"({"version": 1, "verdict": "maybe"})").find("maybe"), std::string::npos);
+  diagnosis.verdict = Verdict::kUnusable;
+  EXPECT_NE(reported(to_json(diagnosis)).find("unusable"), std::string::npos);
 }
 
 TEST(Truths, ReadBackToTheBit) {

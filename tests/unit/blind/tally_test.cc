@@ -20,8 +20,20 @@ Truth truth_of(const std::string& id, CaseKind kind, std::vector<std::string> ef
   return truth;
 }
 
-Reported naming(const std::string& name, double closed = 0.9) {
-  return {"effect", {{name, {"motor_lag"}, 1, {{"travel", 1, 0.5, 1.5}}, closed}}};
+Diagnosis with_verdict(Verdict verdict) {
+  Diagnosis diagnosis;
+  diagnosis.verdict = verdict;
+  return diagnosis;
+}
+
+Diagnosis naming(const std::string& name) {
+  Diagnosis diagnosis = with_verdict(Verdict::kEffect);
+  NamedEffect& effect = diagnosis.effects.emplace_back();
+  effect.name = name;
+  effect.aliases = {"motor_lag"};
+  effect.parameters = {{"travel", 1, 0.5, 1.5, "rad"}};
+  effect.closed = 0.9;
+  return diagnosis;
 }
 
 std::vector<ScoredCase> some_cases() {
@@ -33,14 +45,15 @@ std::vector<ScoredCase> some_cases() {
   cases.push_back(
       score_case(truth_of("case002", CaseKind::kSingle, {"motor_lag"}), {}, naming("backlash")));
   cases.back().realised = 0.5;
-  cases.push_back(score_case(truth_of("case003", CaseKind::kNull, {}), {}, Reported{"none", {}}));
+  cases.push_back(
+      score_case(truth_of("case003", CaseKind::kNull, {}), {}, with_verdict(Verdict::kNone)));
   cases.push_back(score_case(truth_of("case004", CaseKind::kNull, {}), {}, naming("backlash")));
   cases.push_back(score_case(truth_of("case005", CaseKind::kOutside, {"crosstalk"}), {},
-                             Reported{"unknown", {}}));
+                             with_verdict(Verdict::kUnknown)));
   ChildEnd crash{ChildState::kCrashed, 11, 1, "was killed by signal 11"};
   cases.push_back(score_case(truth_of("case006", CaseKind::kSingle, {"backlash"}), crash, {}));
   ScoredCase foreign =
-      score_case(truth_of("case007", CaseKind::kNull, {}), {}, Reported{"none", {}});
+      score_case(truth_of("case007", CaseKind::kNull, {}), {}, with_verdict(Verdict::kNone));
   foreign.has_truth = false;
   cases.push_back(foreign);
   return cases;
@@ -77,7 +90,7 @@ TEST(Tally, HalfIsClosedByTheModelAsItIsUsed) {
 
   Truth truth = truth_of("case001", CaseKind::kOutside, {"backlash"});
   truth.excluded = "backlash";
-  ScoredCase c = score_case(truth, {}, Reported{"unknown", {}});
+  ScoredCase c = score_case(truth, {}, with_verdict(Verdict::kUnknown));
   EXPECT_EQ(tally({c}).outside_closed.total, 0u);
   c.fresh = FreshScores{1.0, 1.0, 2.0, 1.7};
   EXPECT_EQ(tally({c}).outside_closed.hits, 1u);

@@ -88,8 +88,12 @@ TEST(MedianInterval, UsesTheBinomialsOrderStatistics) {
 
 TEST(WilsonInterval, KnownValues) {
   const Interval none = wilson_interval(0, 20, 0.95);
-  EXPECT_NEAR(none.lower, 0, 1e-12);
+  EXPECT_EQ(none.lower, 0);
   EXPECT_NEAR(none.upper, 3.8415 / 23.8415, 1e-4);  // z^2 / (n + z^2)
+  const Interval all = wilson_interval(60, 60, 0.95);
+  EXPECT_NEAR(all.lower, 60 / 63.8415, 1e-5);
+  EXPECT_EQ(all.upper, 1);
+  EXPECT_EQ(wilson_interval(0, 0, 0.95).upper, 1);
   const Interval half = wilson_interval(10, 20, 0.95);
   EXPECT_NEAR(half.lower + half.upper, 1, 1e-12);
   EXPECT_NEAR(half.lower, 0.2993, 1e-4);
