@@ -17,8 +17,6 @@ namespace gapfarm {
 struct Kinematics {
   std::vector<std::string> names;  // "left", "right", "separation", "lag", "delay", ...
   Eigen::VectorXd values;
-  double rms_m = 0;  // of the windows that it was fitted to
-  double rms_rad = 0;
   // Where parts of the floor are measured from, in the tracker's frame: places far from there are
   // unsure by what angles are.
   Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();

@@ -254,13 +254,6 @@ Result<Kinematics> fit_kinematics(const Problem& problem) {
   for (int round = 0; round < kRounds; ++round) {
     descend(all, weights_of(residuals(all, best)), &best);
   }
-  const std::vector<Eigen::Vector3d> r = residuals(all, best);
-  for (const Eigen::Vector3d& d : r) {
-    best.rms_m += d.head<2>().squaredNorm() / static_cast<double>(r.size());
-    best.rms_rad += d[2] * d[2] / static_cast<double>(r.size());
-  }
-  best.rms_m = std::sqrt(best.rms_m);
-  best.rms_rad = std::sqrt(best.rms_rad);
   return best;
 }
 

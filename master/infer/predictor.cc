@@ -181,7 +181,6 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
     }
   }
   ASSIGN_OR_RETURN(const auto results, farm_.run(problem, tasks));
-  predictions_ += requests.size();
   std::vector<std::optional<std::vector<Pose>>> ends(requests.size());
   for (std::size_t k = 0; k < requests.size(); ++k) {
     if ((*errors)[k]) continue;
@@ -223,7 +222,6 @@ Result<std::vector<std::vector<PathSample>>> Predictor::paths(
     trace->set_interval(interval_s);
   }
   ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
-  predictions_ += tasks.size();
   std::vector<std::vector<PathSample>> paths;
   for (const v1::TaskResult& result : results) {
     if (result.outcome() != v1::OK) {

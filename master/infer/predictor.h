@@ -35,20 +35,18 @@ class Predictor {
 
   const Problem& problem() const { return problem_; }
   const std::string& problem_hash() const { return hash_; }
-  std::uint64_t predictions() const { return predictions_; }
 
   // Predicted measured end poses, one a trial asked for, of each request.  Few requests are cut
   // into tasks of some conditions each, so that many workers have something to do.  Errors: the
   // farm's, and a simulation that did not end well (its point is named).
   Result<std::vector<std::vector<Pose>>> ends(const std::vector<PredictionRequest>& requests);
   // The same, but a point outside the parameters' bounds, or one whose simulation does not end
-  // well, has no ends; last_failure() says why.  Errors: the farm's alone.
+  // well, has no ends; failed() says why.  Errors: the farm's alone.
   Result<std::vector<std::optional<std::vector<Pose>>>> attempt(
       const std::vector<PredictionRequest>& requests);
   // The same for all trials at one point, every duty times `factor`, (0, 1]: how drives depend on
   // the speed of a robot whose parameters may know of none.
   Result<std::optional<std::vector<Pose>>> attempt_slower(const Overrides& at, double factor);
-  const std::string& last_failure() const { return last_failure_; }
   // Keeps the last failure as the reason why `what` ("floor_tilt") had to be omitted.
   void exclude(const std::string& what) { excluded_.try_emplace(what, last_failure_); }
   const std::map<std::string, std::string>& excluded() const { return excluded_; }
@@ -76,7 +74,6 @@ class Predictor {
   const Problem& problem_;
   std::string hash_;
   std::vector<std::uint32_t> by_condition_;  // trials, those that share a simulation in a row
-  std::uint64_t predictions_ = 0;
   std::string last_failure_;
   std::map<std::string, std::string> excluded_;
 };

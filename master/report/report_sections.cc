@@ -137,11 +137,6 @@ std::string standing(const Diagnosis& diagnosis, const std::string& effect) {
 
 HtmlRow screened_row(const Diagnosis& diagnosis, const Screened& s, double largest) {
   const bool named = is_named(diagnosis, s.effect);
-  std::string held_out = "–";
-  if (s.held_out) {
-    held_out = number_text(*s.held_out, 2);
-    if (s.held_out_se) held_out += " ± " + number_text(*s.held_out_se, 2);
-  }
   std::string note = html_escaped(s.note);
   if (!s.alias_set.empty()) {
     note = "<span>looks like " + html_names(s.alias_set) + (note.empty() ? "" : "<br>") + note +
@@ -153,8 +148,7 @@ HtmlRow screened_row(const Diagnosis& diagnosis, const Screened& s, double large
   return {"<code>" + html_escaped(s.effect) + "</code>" + standing(diagnosis, s.effect),
           {meter(largest > 0 ? s.gain / largest : 0, named ? "fill-named" : "fill",
                  number_text(s.gain)),
-           p_text(s.p), held_out, html_escaped(s.estimate), from.empty() ? "–" : html_escaped(from),
-           note},
+           p_text(s.p), html_escaped(s.estimate), from.empty() ? "–" : html_escaped(from), note},
           named ? "named" : ""};
 }
 
@@ -244,8 +238,6 @@ std::string screening_section(const Diagnosis& diagnosis) {
                      {{"effect"},
                       {term("gain", "gain, nats in all"), "number with-bar", "gain, nats"},
                       {"p", "number"},
-                      {term("held-out", "held out") + ", " + term("nat", "nats a trial"), "number",
-                       "held out, nats a trial"},
                       {"best strength"},
                       {"would be named from"},
                       {"remarks"}},

@@ -147,10 +147,7 @@ std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effec
 std::vector<std::string> findings(const Diagnosis& diagnosis) {
   const double gap = diagnosis.gap.tuned - diagnosis.gap.floor;
   const double closed = gap > 0 ? (diagnosis.gap.tuned - diagnosis.gap.final_) / gap : 0;
-  std::vector<std::string> text;
-  for (const NamedEffect& effect : diagnosis.effects) {
-    text.push_back(effect.text.empty() ? effect_sentence(effect) : effect.text);
-  }
+  std::vector<std::string> text = mapped(diagnosis.effects, &NamedEffect::text);
   if (diagnosis.effects.size() > 1) {
     text.push_back("Together they close " + percent(closed) + " of the gap" +
                    change_text(diagnosis.position_mm, diagnosis.heading_mrad) + ".");

@@ -38,8 +38,7 @@ std::string deviation_text(int component, double size, bool along_motion, bool t
 
 // "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the
 // gap."  Effects without words, or without their parameters, are named with what is there.
-std::string effect_sentence(const NamedEffect& effect,
-                            const EffectDiagnoses& effects = drive_effect_diagnoses());
+std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& effects);
 
 // Its claim alone, without intervals and full stop.
 std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects);

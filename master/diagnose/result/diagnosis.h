@@ -90,8 +90,6 @@ struct Screened {
   double p = 1;          // against the null distribution of this effect's own gain
   std::string estimate;  // "rate 0.0035 1/min": the parameters at that gain
   std::vector<std::string> alias_set;  // effects whose remaining signatures are parallel
-  std::optional<double> held_out;      // nats a trial gained on held-out trials, when refitted
-  std::optional<double> held_out_se;
   std::string note;  // why it cannot be seen in these data, or what it is an alias of
   // By parameter, how far from neutral it is named with 95 % power on this log, by slopes at the
   // fit, each alone; empty: not known.

@@ -54,9 +54,7 @@ constexpr auto kWhere = [](auto& v, auto& row) {
 };
 constexpr auto kScreened = [](auto& v, auto& row) {
   FIELDS(effect, gain, p);
-  LATER(estimate, alias_set);
-  IF_ANY(held_out, held_out_se);
-  LATER(note);
+  LATER(estimate, alias_set, note);
   v.by_key("detectable_from", row.detectable_from);
 };
 constexpr auto kStep = [](auto& v, auto& row) {

@@ -32,7 +32,7 @@ TEST(Predictor, LeavesOutWhatCannotBeSimulated) {
   EXPECT_TRUE((*tried)[0]);
   EXPECT_FALSE((*tried)[1]);
   EXPECT_FALSE((*tried)[2]);  // beyond its bounds: nobody is asked
-  EXPECT_NE(predictor.last_failure().find("contact_length"), std::string::npos);
+  EXPECT_NE(predictor.failed("it").message.find("contact_length"), std::string::npos);
   const auto ends = predictor.ends({{{{row, 0.11}}, {}}});
   ASSERT_FALSE(ends.ok());
   EXPECT_EQ(ends.error().code, ErrorCode::kSimulation);
@@ -223,7 +223,7 @@ TEST(EffectSentence, NamesTheAxisOfASeamAndWhatAShareMeans) {
   seam.position_mm_after = 58.6;
   seam.heading_mrad_before = 103;
   seam.heading_mrad_after = 98.7;
-  const std::string text = effect_sentence(seam);
+  const std::string text = effect_sentence(seam, drive_effect_diagnoses());
   EXPECT_NE(text.find("a seam at y = 0.1 m"), std::string::npos) << text;
   EXPECT_NE(text.find("from 66 to 58.6 mm"), std::string::npos) << text;
 }

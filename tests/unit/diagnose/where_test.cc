@@ -235,20 +235,21 @@ NamedEffect sag() {
 }
 
 TEST(Findings, ReportEffectsInPlainUnits) {
-  EXPECT_EQ(effect_sentence(sag()),
+  EXPECT_EQ(effect_sentence(sag(), drive_effect_diagnoses()),
             "The battery loses 0.35 % (0.31 to 0.4) of its speed a minute; adding that closes 88 % "
             "of the gap in log score.");
   NamedEffect strange;
   strange.name = "moon_phase";
   strange.parameters = {{"pull", 2, 1, 3, "N"}};
-  EXPECT_EQ(effect_sentence(strange), "The data show moon_phase with pull 2 N (1 to 3).");
+  EXPECT_EQ(effect_sentence(strange, drive_effect_diagnoses()),
+            "The data show moon_phase with pull 2 N (1 to 3).");
   for (const Effect& effect : srv1_effects()) {
     NamedEffect e;
     e.name = effect.name;
     for (const Parameter& p : effect.parameters) {
       e.parameters.push_back({p.key, 0.1, 0.05, 0.2, p.unit});
     }
-    const std::string text = effect_sentence(e);
+    const std::string text = effect_sentence(e, drive_effect_diagnoses());
     EXPECT_EQ(text.find("The data show"), std::string::npos) << text;  // every effect has its words
     EXPECT_EQ(text.find("%1"), std::string::npos) << text;
     Diagnosis d;
@@ -342,7 +343,8 @@ TEST(Findings, ASeamIsReportedWithItsAxis) {
                      {"offset_y", 0, -0.1, 0.1, "m"},
                      {"position", 1.335, 1.23, 1.45, "m"}};
   seam.axis = "y";
-  EXPECT_NE(effect_sentence(seam).find("y = 1.33"), std::string::npos) << effect_sentence(seam);
+  EXPECT_NE(effect_sentence(seam, drive_effect_diagnoses()).find("y = 1.33"), std::string::npos)
+      << effect_sentence(seam, drive_effect_diagnoses());
   Diagnosis d;
   d.verdict = Verdict::kEffect;
   d.effects = {seam};

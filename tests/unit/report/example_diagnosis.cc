@@ -141,38 +141,17 @@ NamedEffect floor_tilt() {
 }
 
 std::vector<Screened> example_screening() {
-  return {{"battery_sag", 402.1, 1e-7, "rate 0.0063 1/min", {}, 0.69, 0.06, ""},
-          {"floor_tilt",
-           271.0,
-           1e-7,
-           "angle 0.019 rad, direction 0.7 rad",
-           {"floor_nap"},
-           0.48,
-           0.05,
-           ""},
-          {"floor_nap",
-           263.8,
-           1e-7,
-           "strength 0.014, direction 0.71 rad",
-           {"floor_tilt"},
-           0.45,
-           0.05,
-           ""},
-          {"camera_seam",
-           31.5,
-           0.012,
-           "y at 0.81 m, offset 3.6 mm",
-           {},
-           0.07,
-           0.04,
-           "too weak to name"},
-          {"camera_aspect", 9.2, 0.21, "ratio 1.004", {"camera_distortion"}, 0.01, 0.02, ""},
-          {"camera_distortion", 8.8, 0.24, "k1 0.02 1/m^2", {"camera_aspect"}, {}, {}, ""},
-          {"com_offset", 3.4, 0.61, "x 1.2 mm, y -0.4 mm", {"marker_offset"}, {}, {}, ""},
-          {"marker_offset", 3.1, 0.64, "x 0.9 mm, y 0.2 mm", {"com_offset"}, {}, {}, ""},
-          {"motor_asymmetry", 0.6, 0.8, "ratio 0.0008", {}, {}, {}, ""},
-          {"motor_lag", 0, 1, "", {}, {}, {}, "cannot be seen: rest poses alone were logged"},
-          {"pose_quantisation", 0, 1, "", {}, {}, {}, ""}};
+  return {{"battery_sag", 402.1, 1e-7, "rate 0.0063 1/min", {}, ""},
+          {"floor_tilt", 271.0, 1e-7, "angle 0.019 rad, direction 0.7 rad", {"floor_nap"}, ""},
+          {"floor_nap", 263.8, 1e-7, "strength 0.014, direction 0.71 rad", {"floor_tilt"}, ""},
+          {"camera_seam", 31.5, 0.012, "y at 0.81 m, offset 3.6 mm", {}, "too weak to name"},
+          {"camera_aspect", 9.2, 0.21, "ratio 1.004", {"camera_distortion"}, ""},
+          {"camera_distortion", 8.8, 0.24, "k1 0.02 1/m^2", {"camera_aspect"}, ""},
+          {"com_offset", 3.4, 0.61, "x 1.2 mm, y -0.4 mm", {"marker_offset"}, ""},
+          {"marker_offset", 3.1, 0.64, "x 0.9 mm, y 0.2 mm", {"com_offset"}, ""},
+          {"motor_asymmetry", 0.6, 0.8, "ratio 0.0008", {}, ""},
+          {"motor_lag", 0, 1, "", {}, "cannot be seen: rest poses alone were logged"},
+          {"pose_quantisation", 0, 1, "", {}, ""}};
 }
 
 std::vector<ParameterRow> example_parameters() {
@@ -279,7 +258,6 @@ Diagnosis null_diagnosis() {
   for (Screened& s : d.screening) {
     s.gain *= 0.01;
     s.p = 0.5;
-    s.held_out.reset();
   }
   d.trials = example_trials(false);
   add_inputs(d);

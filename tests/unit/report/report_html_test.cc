@@ -241,7 +241,7 @@ TEST(ReportHtml, NamesCannotInject) {
   d.effects[0].aliases = {attack};
   d.effects[0].parameters[0] = {attack, 1, 0, 2, attack};
   d.where = d.unexplained = {{attack, attack, attack, attack, 1, 0.5, 0.1, attack}};
-  d.screening = {{attack, 1, 0.5, attack, {attack}, 0.1, 0.1, attack}};
+  d.screening = {{attack, 1, 0.5, attack, {attack}, attack}};
   d.next = {{attack, {attack}, 3}};
   d.cautions = {attack};
   d.trials[0].session = d.trials[0].command = attack;
