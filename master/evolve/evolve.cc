@@ -98,6 +98,16 @@ Result<Score> score_of(const v1::TaskResult& result, const FitnessSettings& fitn
   return score;
 }
 
+Result<std::vector<Score>> scores_of(std::span<const v1::TaskResult> results,
+                                     const FitnessSettings& fitness) {
+  std::vector<Score> scores;
+  for (const v1::TaskResult& result : results) {
+    ASSIGN_OR_RETURN(Score score, score_of(result, fitness));
+    scores.push_back(std::move(score));
+  }
+  return scores;
+}
+
 double cost_of_fitness(FitnessKind kind, double fitness) {
   return higher_is_better(kind) ? -fitness : fitness;
 }

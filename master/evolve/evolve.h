@@ -46,20 +46,20 @@ struct GenerationRecord {
   std::string optimiser_state;      // after this generation
 };
 
-// Keeps a generation; it counts as done once commit() returned.
+// Keeps a generation; it counts as done once commit() returned.  This one keeps nothing.
 class GenerationSink {
  public:
   virtual ~GenerationSink() = default;
-  virtual Status commit(const GenerationRecord& record) = 0;
+  virtual Status commit(const GenerationRecord& /*record*/) { return {}; }
 };
 
 constexpr std::uint64_t kMostAhead = 16;  // generations of an island
 
-// Seconds of a clock that never goes back.
+// Seconds of a clock that never goes back.  Nothing stops by this one's time.
 class EvolveClock {
  public:
   virtual ~EvolveClock() = default;
-  virtual double now_s() const = 0;
+  virtual double now_s() const { return 0; }
 };
 
 enum class StopReason {
@@ -124,6 +124,8 @@ v1::Task evaluation_task(const Candidate& candidate, std::uint64_t run_seed);
 
 // Errors: a worker refused the evaluation, or did not answer with a number an objective.
 Result<Score> score_of(const v1::TaskResult& result, const FitnessSettings& fitness);
+Result<std::vector<Score>> scores_of(std::span<const v1::TaskResult> results,
+                                     const FitnessSettings& fitness);
 
 // How long a run will still take.
 

@@ -118,6 +118,19 @@ class Farm {
 // What run() returns when a stop was requested; its code is kStopped.
 inline Error stop_requested() { return {"stopped by request", ErrorCode::kStopped}; }
 
+// To predict the ends of a problem's trials at a point; scores and covariances are dearer.
+inline v1::Task prediction_task(const std::vector<v1::Override>& at, bool means_only) {
+  v1::Task task;
+  task.mutable_predict()->set_means_only(means_only);
+  task.mutable_predict()->mutable_point()->mutable_overrides()->Assign(at.begin(), at.end());
+  return task;
+}
+inline v1::Task prediction_task(const std::vector<double>& genome, bool means_only) {
+  v1::Task task = prediction_task(std::vector<v1::Override>(), means_only);
+  task.mutable_predict()->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
+  return task;
+}
+
 // An error where `what` did not end well, with the `remedy`, if there is one.
 inline Status ended_well(const v1::TaskResult& result, const std::string& what = "the simulation",
                          const std::string& remedy = "") {

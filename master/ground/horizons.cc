@@ -186,9 +186,7 @@ Result<std::vector<std::optional<v1::Predicted>>> predict_runs(Farm& farm, const
     for (const v1::Predicted& p : result.predict().predictions()) predicted[p.trial()] = p;
   }
   if (*unfinished < results.size()) return predicted;
-  const v1::TaskResult& first = results.front();
-  return Error{"the simulation ended with " + v1::Outcome_Name(first.outcome()) + " (" +
-               first.message() + ")"};
+  return ended_well(results.front()).error();
 }
 
 }  // namespace

@@ -47,9 +47,8 @@ Status put_stretches(const RunLog& runs, double every_s, Problem* to, DrivenPath
 }
 
 Result<std::vector<Pose>> simulated_ends(Farm& farm, const Problem& problem) {
-  v1::Task task;
-  task.mutable_predict();
-  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)),
+                                                {prediction_task(Genome(), false)}));
   const v1::TaskResult& result = results.front();
   RETURN_IF_ERROR(ended_well(result));
   return mapped(result.predict().predictions(),
@@ -146,12 +145,7 @@ Result<std::vector<SimulatedWindow>> simulate_window(Farm& farm, const Problem& 
     stretch.duration_s = time(k);
     asked.log.trials.push_back(std::move(stretch));
   }
-  std::vector<v1::Task> tasks(genomes.size());
-  for (std::size_t g = 0; g < genomes.size(); ++g) {
-    v1::PredictTask& predict = *tasks[g].mutable_predict();
-    predict.set_means_only(true);
-    predict.mutable_point()->mutable_genome()->Add(genomes[g].begin(), genomes[g].end());
-  }
+  const auto tasks = mapped(genomes, [](const Genome& g) { return prediction_task(g, true); });
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(asked)), tasks));
   std::vector<SimulatedWindow> windows;
   for (const v1::TaskResult& result : results) {

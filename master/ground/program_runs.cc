@@ -95,15 +95,6 @@ class ProgramFarm {
     return nullptr;
   }
 
-  v1::Task task_at(const std::vector<double>& values) const {
-    v1::Task task;
-    v1::PredictTask* predict = task.mutable_predict();
-    const std::vector<v1::Override> overrides = overrides_of(problem_.values, values);
-    predict->mutable_point()->mutable_overrides()->Add(overrides.begin(), overrides.end());
-    predict->set_means_only(true);
-    return task;
-  }
-
   Motions motions_of(const v1::TaskResult& result, const Known& known) {
     auto motions = std::make_shared<std::vector<Pose>>(known.starts.size(), Pose{kFar_m, 0, 0});
     if (result.outcome() == v1::OK) {
@@ -125,8 +116,9 @@ class ProgramFarm {
       const bool there = find(known, values) != nullptr || contains(missing, values);
       if (!there) missing.push_back(std::move(values));
     }
-    std::vector<v1::Task> tasks;
-    for (const auto& values : missing) tasks.push_back(task_at(values));
+    const auto tasks = mapped(missing, [&](const std::vector<double>& values) {
+      return prediction_task(overrides_of(problem_.values, values), true);
+    });
     if (failure_ && !tasks.empty()) {
       const auto results = farm_.run(known.problem, tasks);
       if (!results) failure_ = results.error();

@@ -65,9 +65,8 @@ Result<std::string> baseline_note(const Model& model, const TrialLog& log,
 
 Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& genome, Farm& farm) {
   if (!has_baselines(problem.scenario) || problem.log.trials.empty()) return std::string();
-  v1::Task task;
-  task.mutable_predict()->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
-  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
+  ASSIGN_OR_RETURN(const auto results,
+                   farm.run(farm.add_problem(to_proto(problem)), {prediction_task(genome, false)}));
   if (results.front().outcome() != v1::OK) return std::string();
   ASSIGN_OR_RETURN(const auto beside, baselines_beside(problem, results.front().predict()));
   const std::string sentence = baseline_sentence(beside, "the model");

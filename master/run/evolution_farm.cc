@@ -240,12 +240,7 @@ Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> cand
     progress_.on_progress(p);
   }));
   note_failures(tasks, results);
-  std::vector<Score> scores;
-  for (const v1::TaskResult& result : results) {
-    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness));
-    scores.push_back(score);
-  }
-  return scores;
+  return scores_of(results, problem_.fitness);
 }
 
 Status StoreSink::commit(const GenerationRecord& record) {

@@ -158,12 +158,6 @@ Model model_of(const RunStore& store, const Problem& problem, const Config& conf
   return model;
 }
 
-v1::Task predict_task(const Genome& genome) {
-  v1::Task task;
-  task.mutable_predict()->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
-  return task;
-}
-
 // Each beside what the best scores on the trials that it can predict.
 std::vector<ScoreRow> baseline_rows(const std::vector<BaselineComparison>& comparisons) {
   std::vector<ScoreRow> rows;
@@ -177,9 +171,9 @@ std::vector<ScoreRow> baseline_rows(const std::vector<BaselineComparison>& compa
 Status write_poses(RunStore& store, const Problem& problem, const EvolveSummary& summary,
                    Farm& farm, const std::vector<ScoreRow>& validated) {
   // As the config had them, and as evolved.
-  ASSIGN_OR_RETURN(const auto results,
-                   farm.run(farm.add_problem(to_proto(problem)),
-                            {predict_task({}), predict_task(summary.best->genome)}));
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)),
+                                                {prediction_task(Genome(), false),
+                                                 prediction_task(summary.best->genome, false)}));
   std::vector<PredictionOfLog> predictions;
   const char* const labels[] = {"before", "after"};
   const PredictionOfLog* known[] = {nullptr, nullptr};

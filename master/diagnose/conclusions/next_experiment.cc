@@ -52,13 +52,10 @@ Result<std::vector<Predictions>> predict(Farm& farm, const ExperimentPlan& plan,
   std::vector<std::size_t> of_baseline;
   for (std::size_t r = 0; r < alternatives.size(); ++r) {
     for (const std::string& group : groups_of(plan)) {
-      v1::Task task;
-      v1::PredictTask& to = *task.mutable_predict();
-      for (const v1::Override& o : alternatives[r].overrides)
-        *to.mutable_point()->add_overrides() = o;
+      v1::Task task = prediction_task(alternatives[r].overrides, false);
       for (const Design& design : plan.designs) {
         if (design.group != group) continue;
-        for (const std::uint32_t i : design.trials) to.add_trials(i);
+        for (const std::uint32_t i : design.trials) task.mutable_predict()->add_trials(i);
       }
       tasks.push_back(std::move(task));
       of_baseline.push_back(r);

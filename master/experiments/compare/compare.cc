@@ -151,11 +151,9 @@ CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
         return evaluation_task(requests[i].candidate, requests[i].seed);
       });
       ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
-      for (std::size_t k = 0; k < members.size(); ++k) {
-        ASSIGN_OR_RETURN(const auto score,
-                         score_of(results[k], fitness[requests[members[k]].variant]));
-        scores[members[k]] = score;
-      }
+      ASSIGN_OR_RETURN(const auto scored,
+                       scores_of(results, fitness[requests[members.front()].variant]));
+      for (std::size_t k = 0; k < members.size(); ++k) scores[members[k]] = scored[k];
     }
     return scores;
   };

@@ -224,12 +224,7 @@ class Backend : public EvaluationBackend {
     const auto tasks =
         mapped(candidates, [&](const Candidate& c) { return evaluation_task(c, seed_); });
     ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
-    std::vector<Score> scores;
-    for (const v1::TaskResult& result : results) {
-      ASSIGN_OR_RETURN(Score score, score_of(result, fitness_));
-      scores.push_back(std::move(score));
-    }
-    return scores;
+    return scores_of(results, fitness_);
   }
 
  private:
@@ -237,17 +232,6 @@ class Backend : public EvaluationBackend {
   Farm& farm_;
   std::uint64_t seed_;
   std::string hash_;
-};
-
-class NoSink : public GenerationSink {
- public:
-  Status commit(const GenerationRecord& /*record*/) override { return {}; }
-};
-
-// Nothing here stops by time.
-class NoClock : public EvolveClock {
- public:
-  double now_s() const override { return 0; }
 };
 
 }  // namespace
@@ -304,8 +288,8 @@ Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& set
   });
   ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
   Backend backend(problem, farm, settings.seed);
-  NoSink sink;
-  const NoClock clock;
+  GenerationSink sink;
+  const EvolveClock clock;
   EvolveOptions options;
   options.settings = settings.evolution;
   options.fitness = problem.fitness.kind;
@@ -325,15 +309,9 @@ Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,
   plain.genes.clear();
   // Any fitness will do; this one asks nothing of the log.
   plain.fitness.kind = FitnessKind::kLogScore;
-  std::vector<v1::Task> tasks;
-  for (const ParameterValues& values : points) {
-    v1::Task task;
-    task.mutable_predict()->set_means_only(!log_scores);
-    for (const v1::Override& override : overrides_of(plain.values, values)) {
-      *task.mutable_predict()->mutable_point()->add_overrides() = override;
-    }
-    tasks.push_back(std::move(task));
-  }
+  const auto tasks = mapped(points, [&](const ParameterValues& values) {
+    return prediction_task(overrides_of(plain.values, values), !log_scores);
+  });
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(plain)), tasks));
   std::vector<PredictedEnds> all;
   for (const v1::TaskResult& result : results) {

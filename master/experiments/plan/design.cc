@@ -126,11 +126,9 @@ Result<TrialLog> Designer::driven(const Sessions& plan) {
   TrialLog log;
   for (std::size_t s = 0; s < results.size(); ++s) {
     const v1::TaskResult& result = results[s];
-    if (result.outcome() != v1::OK) {
-      return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                       result.message() + "); these parameters do not make a robot that drives",
-                   ErrorCode::kSimulation};
-    }
+    const Status ended =
+        ended_well(result, "the simulation", "; these parameters do not make a robot that drives");
+    if (!ended) return Error{ended.error().message, ErrorCode::kSimulation};
     for (std::size_t i = 0; i < plan[s].size(); ++i) {
       Trial trial = from_proto(result.simulate().trials(static_cast<int>(i)));
       // What the least noise leaves between two readings of one place is no move.

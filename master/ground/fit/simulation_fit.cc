@@ -55,12 +55,7 @@ SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
 
 Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<Genome>& genomes,
                                                               const std::vector<Hold>& holds) {
-  std::vector<v1::Task> tasks;
-  for (const Genome& genome : genomes) {
-    v1::PredictTask* predict = tasks.emplace_back().mutable_predict();
-    predict->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
-    predict->set_means_only(true);
-  }
+  const auto tasks = mapped(genomes, [](const Genome& g) { return prediction_task(g, true); });
   simulations_ += tasks.size();
   ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
   std::vector<std::optional<At>> all;

@@ -138,14 +138,11 @@ void add_overrides(const ParameterTable& table, std::size_t effect,
 
 // Predictions of some of the planned trials by the robot of `truth`.
 v1::Task predict_task(const Problem& planned, const Truth& truth) {
-  v1::Task task;
-  v1::PredictTask* predict = task.mutable_predict();
-  const std::vector<v1::Override> robot = overrides_of(planned.table(), truth);
-  predict->mutable_point()->mutable_overrides()->Add(robot.begin(), robot.end());
+  v1::Task task = prediction_task(overrides_of(planned.table(), truth), false);
   const std::size_t count = planned.log.trials.size();
   const std::size_t wanted = std::min(count, kMostSizeTrials);
   for (std::size_t i = 0; i < wanted; ++i) {
-    predict->add_trials(static_cast<std::uint32_t>(i * count / wanted));
+    task.mutable_predict()->add_trials(static_cast<std::uint32_t>(i * count / wanted));
   }
   return task;
 }
@@ -173,10 +170,9 @@ Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
   std::vector<v1::Task> tasks;
   for (const Truth& truth : drafts.cases) tasks.push_back(predict_task(planned, truth));
   ASSIGN_OR_RETURN(const auto base, farm.run(hash, tasks));
-  for (std::size_t i = 0; i < base.size(); ++i) {
-    if (base[i].outcome() == v1::OK) continue;
-    return Error{"a robot near the config's ends with " + v1::Outcome_Name(base[i].outcome()) +
-                 " (" + base[i].message() + "); the config's values do not make one that drives"};
+  for (const v1::TaskResult& result : base) {
+    RETURN_IF_ERROR(ended_well(result, "a robot near the config's",
+                               "; the config's values do not make one that drives"));
   }
   for (;;) {
     std::vector<std::size_t> open;
