@@ -60,8 +60,7 @@ const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p) {
 EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, const char* sentence) {
   first.effect = effect;
   first.marks = nullptr;
-  first.phrases.sentence = sentence;
-  first.short_phrases.reset();
+  first.phrases = {sentence, first.phrases.parameters};
   return first;
 }
 

@@ -30,20 +30,13 @@ struct ShownParameter {
 };
 
 struct EffectPhrases {
-  // %1, %2, ...: the tellings' values with their intervals; %a: a seam's axis.  Null: none.
+  // %1, %2, ...: the parameters' values with their intervals; %a: a seam's axis.  Null: none.
   const char* sentence = nullptr;
   std::vector<ShownParameter> parameters = {};
-};
-
-// On one line.  %: the size of the parameter; @: the choice of the effect that is no number ("y").
-struct ShortPhrases {
-  const char* key;  // whose size is reported
-  double factor;
-  const char* unit;
-  const char* cause;
-  const char* opposite;  // where the value is negative; null: the same
-  const char* remedy;
-  const char* toward = nullptr;  // key of a direction that is reported, too
+  // On one line, without intervals, where %1 is a size.  Null: no line of its own.
+  const char* remedy = nullptr;
+  const char* brief = nullptr;     // null: the sentence
+  const char* opposite = nullptr;  // where the first value is negative; null: the same
 };
 
 struct SpreadRow;
@@ -151,7 +144,6 @@ struct EffectDiagnosis {
   bool (*contaminates)(const Signature& chosen, const ResidualTrial& trial) = nullptr;
 
   EffectPhrases phrases = {};
-  std::optional<ShortPhrases> short_phrases = {};
   const SpreadRow* spread = nullptr;  // of an effect that makes some trials outliers
   // Of what no mean shows: how screening says that it was seen, or not.
   const char* found = nullptr;

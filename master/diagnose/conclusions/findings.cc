@@ -35,27 +35,6 @@ std::string plain_claim(const NamedEffect& effect, bool intervals) {
   return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
 }
 
-std::string claim(const NamedEffect& effect, const EffectDiagnoses& effects, bool intervals) {
-  const EffectPhrases& phrases = effects.row(effect.name).phrases;
-  if (phrases.sentence == nullptr) return plain_claim(effect, intervals);
-  std::string text;
-  for (const char* c = phrases.sentence; *c != 0; ++c) {
-    if (*c != '%') {
-      text += *c;
-      continue;
-    }
-    if (*++c == 'a') {
-      text += effect.axis.empty() ? "its axis" : effect.axis;
-      continue;
-    }
-    const ShownParameter& shown = phrases.parameters[static_cast<std::size_t>(*c - '1')];
-    const Estimate* e = find_by(effect.parameters, shown.key, &Estimate::key);
-    if (e == nullptr) return plain_claim(effect, intervals);
-    text += estimate_text(*e, shown.factor, shown.unit, intervals);
-  }
-  return text;
-}
-
 std::string percent(double share) {
   return std::to_string(std::lround(100 * std::clamp(share, 0.0, 1.0))) + " %";
 }
@@ -127,8 +106,30 @@ std::string change_text(const GapFigures& position_mm, const GapFigures& heading
          " to " + plain_number(heading_mrad.final_) + " mrad)";
 }
 
+std::string effect_claim(const NamedEffect& effect, const EffectPhrases& phrases, const char* text,
+                         bool intervals) {
+  if (text == nullptr) return plain_claim(effect, intervals);
+  std::string filled;
+  for (const char* c = text; *c != 0; ++c) {
+    if (*c != '%') {
+      filled += *c;
+      continue;
+    }
+    if (*++c == 'a') {
+      filled += effect.axis.empty() ? "its axis" : effect.axis;
+      continue;
+    }
+    const ShownParameter& shown = phrases.parameters[static_cast<std::size_t>(*c - '1')];
+    const Estimate* e = find_by(effect.parameters, shown.key, &Estimate::key);
+    if (e == nullptr) return plain_claim(effect, intervals);
+    filled += estimate_text(*e, shown.factor, shown.unit, intervals);
+  }
+  return filled;
+}
+
 std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& effects) {
-  std::string text = claim(effect, effects, true);
+  const EffectPhrases& phrases = effects.row(effect.name).phrases;
+  std::string text = effect_claim(effect, phrases, phrases.sentence, true);
   if (std::isfinite(effect.closed) && effect.closed > 0) {
     text += "; adding that closes " + percent(effect.closed) + " of the gap in log score";
     if (effect.position_mm_before && effect.position_mm_after && effect.heading_mrad_before &&
@@ -138,10 +139,6 @@ std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& ef
     }
   }
   return text + ".";
-}
-
-std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects) {
-  return claim(effect, effects, false);
 }
 
 std::vector<std::string> findings(const Diagnosis& diagnosis) {

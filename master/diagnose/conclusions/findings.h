@@ -40,8 +40,9 @@ std::string deviation_text(int component, double size, bool along_motion, bool t
 // gap."  Effects without words, or without their parameters, are named with what is there.
 std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& effects);
 
-// Its claim alone, without intervals and full stop.
-std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects);
+// `text`, one of its phrases, with its values put in and without a full stop.
+std::string effect_claim(const NamedEffect& effect, const EffectPhrases& phrases, const char* text,
+                         bool intervals);
 
 std::vector<std::string> findings(const Diagnosis& diagnosis);
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
+#include "common/base/ranges.h"
 #include "common/math/laws.h"
 #include "master/io/log_checks/finding.h"
 
@@ -12,41 +12,31 @@ namespace {
 
 constexpr std::size_t kLine = 100;  // characters, about what fits on one line in large print
 
-const Estimate* size_of(const NamedEffect& effect, const ShortPhrases& phrases) {
-  for (const Estimate& e : effect.parameters) {
-    if (e.key == phrases.key && std::isfinite(e.value)) return &e;
-  }
-  return nullptr;
+// What its line is about; null: it has no line, or the size is not known.
+const Estimate* size_of(const NamedEffect& effect, const EffectPhrases& phrases) {
+  if (phrases.remedy == nullptr) return nullptr;
+  const Estimate* size = find_by(effect.parameters, phrases.parameters[0].key, &Estimate::key);
+  return size != nullptr && std::isfinite(size->value) ? size : nullptr;
 }
 
-std::string filled(const char* text, const NamedEffect& effect, const ShortPhrases& phrases,
-                   double value) {
-  std::string line;
-  for (const char* c = text; *c != 0; ++c) {
-    if (*c == '%') {
-      line += plain_number(std::abs(phrases.factor * value)) + phrases.unit;
-    } else if (*c == '@') {
-      line += effect.axis.empty() ? "the seam" : effect.axis;
-    } else {
-      line += *c;
-    }
+std::string brief_claim(NamedEffect effect, const EffectPhrases& phrases, const char* text) {
+  for (std::size_t i = 0; i < phrases.parameters.size(); ++i) {
+    Estimate* e = find_by(effect.parameters, phrases.parameters[i].key, &Estimate::key);
+    if (e == nullptr) continue;
+    if (i == 0) e->value = std::abs(e->value);
+    if (phrases.parameters[i].factor == kDegrees)  // where to, as far as anybody looks
+      e->value = std::round(kDegrees * e->value) / kDegrees;
   }
-  return line;
+  return effect_claim(effect, phrases, text, false);
 }
 
 std::string cause_of(const NamedEffect& effect, const EffectDiagnoses& effects) {
-  const std::optional<ShortPhrases>& phrases = effects.row(effect.name).short_phrases;
-  const Estimate* size = phrases ? size_of(effect, *phrases) : nullptr;
-  if (size == nullptr) return effect_claim(effect, effects);
-  const bool opposite = size->value < 0 && phrases->opposite != nullptr;
-  std::string line =
-      filled(opposite ? phrases->opposite : phrases->cause, effect, *phrases, size->value);
-  for (const Estimate& e : effect.parameters) {
-    if (phrases->toward != nullptr && e.key == phrases->toward) {
-      line += " toward " + plain_number(std::round(kDegrees * e.value)) + " degrees";
-    }
-  }
-  return line;
+  const EffectPhrases& phrases = effects.row(effect.name).phrases;
+  const Estimate* size = size_of(effect, phrases);
+  if (size == nullptr) return effect_claim(effect, phrases, phrases.sentence, false);
+  const bool opposite = size->value < 0 && phrases.opposite != nullptr;
+  const char* brief = phrases.brief != nullptr ? phrases.brief : phrases.sentence;
+  return brief_claim(effect, phrases, opposite ? phrases.opposite : brief);
 }
 
 std::string first_cause(const Diagnosis& d, const EffectDiagnoses& effects) {
@@ -128,11 +118,10 @@ std::string action(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
            " trials under what to try next: they distinguish " + first.name + " from " +
            first.aliases.front() + ".";
   }
-  const std::optional<ShortPhrases>& phrases = effects.row(first.name).short_phrases;
-  const Estimate* size = phrases ? size_of(first, *phrases) : nullptr;
+  const EffectPhrases& phrases = effects.row(first.name).phrases;
   const std::string paste = "paste the parameters below into your config.";
-  if (size == nullptr) return "P" + paste.substr(1);
-  return filled(phrases->remedy, first, *phrases, size->value) + ", or " + paste;
+  if (size_of(first, phrases) == nullptr) return "P" + paste.substr(1);
+  return brief_claim(first, phrases, phrases.remedy) + ", or " + paste;
 }
 
 void fill_conclusions(const EffectDiagnoses& effects, Diagnosis* diagnosis) {

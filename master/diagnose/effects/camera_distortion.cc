@@ -27,9 +27,9 @@ extern const EffectDiagnosis kCameraDistortion = {
     .model_error = 0.03,
     .places = {{"x", 0}, {"y", 1}},
     .phrases = {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
-                {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}},
-    .short_phrases = ShortPhrases{"k1", 1, "", "The camera's lens bends positions", nullptr,
-                                  "Calibrate the lens"},
+                {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}},
+                "Calibrate the lens",
+                "The camera's lens bends positions"},
 };
 
 }  // namespace gapfarm

@@ -76,10 +76,10 @@ EffectDiagnosis first_seam() {
       .are_two = are_two_seams,
       .contaminates = contaminated_at_line,
       .phrases = {"Beyond a seam at %a = %1 the poses are shifted by %2 in x and %3 in y",
-                  {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}},
-      .short_phrases = ShortPhrases{"position", 1, " m", "Two cameras disagree at @ = %",
-                                    "Two cameras disagree at @ = −%",
-                                    "Calibrate the cameras against each other at the seam"},
+                  {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}},
+                  "Calibrate the cameras against each other at the seam",
+                  "Two cameras disagree at %a = %1",
+                  "Two cameras disagree at %a = −%1"},
   };
 }
 

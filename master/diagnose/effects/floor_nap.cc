@@ -76,10 +76,9 @@ extern const EffectDiagnosis kFloorNap = {
     .model_error = 0.2,
     .direction_error_rad = 0.02,
     .phrases = {"The floor has a nap that drags with %1 of the weight against %2",
-                {{"strength", 100, " %"}, {"direction", 180 / std::numbers::pi, " degrees"}}},
-    .short_phrases =
-        ShortPhrases{"strength", 100, " %", "The floor has a nap that drags with % of the weight",
-                     nullptr, "Drive on a floor without pile"},
+                {{"strength", 100, " %"}, {"direction", 180 / std::numbers::pi, " degrees"}},
+                "Drive on a floor without pile",
+                "The floor has a nap that drags with %1 of the weight"},
 };
 
 }  // namespace gapfarm

@@ -76,9 +76,9 @@ extern const EffectDiagnosis kFloorTilt = {
     .model_error = 0.3,
     .direction_error_rad = 0.02,
     .phrases = {"The floor falls by %1 toward %2",
-                {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}},
-    .short_phrases = ShortPhrases{"angle", 1000, " mrad", "The floor slopes by %", nullptr,
-                                  "Level the floor", "direction"},
+                {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}},
+                "Level the floor",
+                "The floor slopes by %1 toward %2"},
 };
 
 }  // namespace gapfarm

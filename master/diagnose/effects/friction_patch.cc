@@ -57,9 +57,9 @@ EffectDiagnosis first_patch() {
       .contaminates = contaminated_at_edge,
       .phrases = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times "
                   "the friction",
-                  {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}},
-      .short_phrases = ShortPhrases{"ratio", 1, "", "A patch of the floor has % times the friction",
-                                    nullptr, "Look at the floor there"},
+                  {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}},
+                  "Look at the floor there",
+                  "A patch of the floor has %1 times the friction"},
   };
 }
 

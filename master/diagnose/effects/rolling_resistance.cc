@@ -36,9 +36,9 @@ extern const EffectDiagnosis kRollingResistance = {
     .family = &kReachFamily,
     .aliases = {"motor_deadband"},
     .model_error = 0.3,
-    .phrases = {"Rolling drags with %1 of the weight", {{"coefficient", 100, " %"}}},
-    .short_phrases = ShortPhrases{"coefficient", 100, " %", "Rolling drags with % of the weight",
-                                  nullptr, "Give the simulation that drag"},
+    .phrases = {"Rolling drags with %1 of the weight",
+                {{"coefficient", 100, " %"}},
+                "Give the simulation that drag"},
 };
 
 }  // namespace gapfarm

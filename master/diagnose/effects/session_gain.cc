@@ -17,9 +17,9 @@ const SpreadRow kSessionSpread = {
 extern const EffectDiagnosis kSessionGain = {
     .effect = "session_gain",
     .phrases = {"Each session drives at a speed of its own, which differ by %1",
-                {{"spread", 100, " %"}}},
-    .short_phrases = ShortPhrases{"spread", 100, " %", "The sessions' speeds differ by %", nullptr,
-                                  "Begin every session alike: charged, and on a clean floor"},
+                {{"spread", 100, " %"}},
+                "Begin every session alike: charged, and on a clean floor",
+                "The sessions' speeds differ by %1"},
     .spread = &kSessionSpread,
     .found = "by sessions that drive faster or slower as a whole",
     .missing = "no session drives faster or slower as a whole than others",

@@ -107,10 +107,9 @@ const SpreadRow kUnsettledSpread = {
 extern const EffectDiagnosis kUnsettledStart = {
     .effect = "unsettled_start",
     .phrases = {"%1 of the starts after unrecorded moves were read in the hand, turned by up to %2",
-                {{"share", 100, " %"}, {"angle", kDegrees, " degrees"}}},
-    .short_phrases =
-        ShortPhrases{"share", 100, " %", "% of the starts after moves were read too early", nullptr,
-                     "Let go of the robot before its pose is read"},
+                {{"share", 100, " %"}, {"angle", kDegrees, " degrees"}},
+                "Let go of the robot before its pose is read",
+                "%1 of the starts after moves were read too early"},
     .spread = &kUnsettledSpread,
     .found = "by drives that are turned after an unrecorded move",
     .missing = "drives after an unrecorded move are outliers no more than others",

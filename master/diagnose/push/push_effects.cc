@@ -72,14 +72,14 @@ std::vector<EffectDiagnosis> pushed_rows() {
       {.effect = "camera_aspect",
        .searched = {{"ratio", 0.02, true}, {"camera_scale", 0.02, true}},
        .model_error = aspect.model_error,
-       .phrases = aspect.phrases},
+       .phrases = {aspect.phrases.sentence, aspect.phrases.parameters}},
       {.effect = "camera_distortion",
        .searched = {{"k1", 0.05}, {"x", 0.1}, {"y", 0.1}},
        .proposals = push_lens_starts,
        .start = lens.start,
        .model_error = lens.model_error,
        .places = lens.places,
-       .phrases = lens.phrases},
+       .phrases = {lens.phrases.sentence, lens.phrases.parameters}},
   };
 }
 
