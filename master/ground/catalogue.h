@@ -26,6 +26,12 @@ class Catalogue {
   void tracker();
   void floors();
   void world();
+  GroundHypothesis& fault(const std::string& name, std::vector<std::string> aliases,
+                          const std::string& thing, const std::string& remedy,
+                          std::function<void(RunLog*)> put_right) {
+    all.push_back({name, std::move(aliases), thing, {}, std::move(put_right), 1, remedy});
+    return all.back();
+  }
 
   std::vector<GroundHypothesis> all;
 
@@ -38,12 +44,6 @@ class Catalogue {
     const double more_values = static_cast<double>(freed.size()) - 1;
     all.push_back({name, std::move(aliases), thing, std::move(freed)});
     all.back().price = kPriceOfAValue * more_values;
-    return all.back();
-  }
-  GroundHypothesis& fault(const std::string& name, std::vector<std::string> aliases,
-                          const std::string& thing, const std::string& remedy,
-                          std::function<void(RunLog*)> put_right) {
-    all.push_back({name, std::move(aliases), thing, {}, std::move(put_right), 1, remedy});
     return all.back();
   }
 

@@ -1,5 +1,7 @@
 #include "master/ground/program_runs.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -9,6 +11,8 @@
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "common/base/try.h"
+#include "master/ground/catalogue.h"
+#include "master/ground/put_right.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
 
@@ -19,7 +23,8 @@ constexpr std::size_t kKept = 32;              // motions at values of commands
 constexpr double kFar_m = 1e6;                 // where a program that diverges is held to be
 constexpr double kReach_m = 0.3;               // of a robot whose size nobody knows
 constexpr double kChannelOffsetShare = 0.005;  // of a channel's root mean square
-constexpr double kTunedShare = 0.25;           // of a gene's range, as a standard deviation
+constexpr double kUntuned = 0.05;     // m: a unit above it, a foot say, is what no tuning is
+constexpr double kTunedShare = 0.25;  // of a gene's range, as a standard deviation
 constexpr const char* kMarkers[] = {"marker_x", "marker_y", "marker_yaw"};
 constexpr const char* kMarkerRows[] = {"marker.x", "marker.y", "marker.yaw"};
 // Of the kinematics' rows, those that say how a program is asked and read.
@@ -294,6 +299,45 @@ Result<GroundDiagnosis> diagnose_program_runs(Farm& farm, const std::vector<Gene
     }
     return found;
   });
+}
+
+Result<std::optional<SanityFinding>> check_program_log(Farm& farm, const Problem& problem,
+                                                       const RunLog& log,
+                                                       const WindowSettings& settings) {
+  ProgramFarm program(farm, problem);
+  const GroundRobot robot = robot_of(problem, program.X_RM());
+  Catalogue faults(robot, {});
+  faults.wrong_poses();
+  // Of commands, but seen as well without another run of the program.
+  faults.fault("sides_swapped", {"command_sign"}, "the side to which it turns",
+               "Exchange left and right in the commands, or mirror the poses.",
+               change_poses(Eigen::Vector3d(1, -1, -1).asDiagonal()));
+  faults.fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
+               "Turn the sign of x.", change_poses(Eigen::Vector3d(-1, 1, 1).asDiagonal()));
+  std::erase_if(faults.all,
+                [](const GroundHypothesis& h) { return h.metres > kUntuned && h.metres < 1; });
+  GroundQuestion question;
+  question.catalogue = std::move(faults.all);
+  ASSIGN_OR_RETURN(const auto logged, window_set(robot, log, settings));
+  const std::vector<Pose> ends = program.simulation(logged)({Kinematics{}}).front();
+  RETURN_IF_ERROR(program.failure());
+  // Wherever a window is said to start, the program goes the same way from there.
+  question.simulation = [&](const WindowSet& windows) -> decltype(WindowSet::simulated) {
+    std::vector<Pose> moved;
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      moved.push_back(windows.trials[i].X_WS * between(logged.trials[i].X_WS, ends[i]));
+    }
+    return [moved](const auto& points) { return std::vector(points.size(), moved); };
+  };
+  const auto fault = find_ground_fault(robot, log, question, settings);
+  if (!fault) return std::optional<SanityFinding>();
+  const GroundHypothesis& h = question.catalogue[fault->hypothesis];
+  return std::optional(SanityFinding{
+      h.name,
+      fmt::format("With {} put right, windows end {:.1f} times as near to where the program has "
+                  "them.",
+                  h.thing, fault->shrinks),
+      h.remedy});
 }
 
 }  // namespace gapfarm

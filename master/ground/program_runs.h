@@ -2,7 +2,7 @@
 // readings is wrong (docs/external.md).
 #pragma once
 
-#include <string>
+#include <optional>
 #include <vector>
 
 #include "common/base/result.h"
@@ -20,5 +20,12 @@ Result<GroundDiagnosis> diagnose_program_runs(Farm& farm, const std::vector<Gene
                                               const RunLog& log,
                                               const GroundDiagnoseOptions& options,
                                               Problem* problem);
+
+// What of a log's poses is the wrong way round, or in another unit, beside where the program at the
+// problem's own values has its robot go, which is asked once; none: nothing.  Errors: no window
+// fits into the runs; the farm's, and of a program that fails.
+Result<std::optional<SanityFinding>> check_program_log(Farm& farm, const Problem& problem,
+                                                       const RunLog& log,
+                                                       const WindowSettings& settings);
 
 }  // namespace gapfarm

@@ -20,10 +20,10 @@
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 #include "master/ground/diagnose_ground.h"
+#include "master/ground/program_runs.h"
 #include "master/io/log_checks/finding.h"
 #include "master/io/log_checks/log_checks.h"
 #include "master/io/log_checks/sanity.h"
-#include "master/io/log_checks/window_checks.h"
 #include "master/run/run.h"
 
 namespace gapfarm {
@@ -84,14 +84,12 @@ Status measure_evaluation(const Config& config, CliContext& context, Summary* su
   }
   if (took_s.size() > 1) took_s.erase(took_s.begin());
   summary->evaluation_s = median(took_s);
-  if (!config.problem.windows() || config.problem.ground) return {};
+  const Problem& problem = config.problem;
+  if (!problem.windows() || problem.ground || has_failed(*summary->evaluated)) return {};
   // Nothing but the program says where its robot should be.
-  v1::Task task;
-  task.mutable_predict()->set_means_only(true);
-  ASSIGN_OR_RETURN(const auto predicted, farm->run(hash, {task}));
-  std::vector<Pose> ends = mapped(predicted.front().predict().predictions(),
-                                  [](const v1::Predicted& p) { return from_proto(p.end()); });
-  check_windows(config.problem.log, ends, &summary->sanity);
+  ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, problem.channels()));
+  ASSIGN_OR_RETURN(const auto found, check_program_log(*farm, problem, runs, config.windows));
+  if (found) summary->sanity.push_back(*found);
   return {};
 }
 

@@ -9,7 +9,6 @@
 #include "common/math/statistics.h"
 #include "common/parameters/push.h"
 #include "master/io/log_checks/log_checks.h"
-#include "master/io/log_checks/pose_faults.h"
 #include "master/io/log_checks/run_checks.h"
 
 namespace gapfarm {
@@ -55,6 +54,37 @@ double outside(const Eigen::Vector2d& p_W, const Piece& piece, const Pose& X_WP)
   }
   return most;
 }
+
+// In which ways the pieces' poses are the wrong way round, and put right.
+struct PoseFault {
+  const char* name;
+  const char* text;
+  const char* remedy;
+  double x_x, x_y;     // x put right, of x and y as logged
+  double y_x, y_y;     // and y
+  double sense, turn;  // of headings; rad
+
+  Pose put_right(const Pose& X) const {
+    return {x_x * X.x + x_y * X.y, y_x * X.x + y_y * X.y, sense * X.theta + turn};
+  }
+};
+
+constexpr PoseFault kPoseFaults[] = {
+    {"axis_mirrored", "What should turn left turns right.",
+     "Negate y and theta of the pieces, or mirror the finger's way.", 1, 0, 0, -1, -1, 0},
+    {"heading_flipped", "Headings grow the other way round than turns do.", "Negate theta.", 1, 0,
+     0, 1, -1, 0},
+    {"axis_mirrored", "One axis points the other way than headings say.", "Negate x or y.", 1, 0, 0,
+     -1, 1, 0},
+    {"axis_mirrored", "One axis points the other way than headings say.", "Negate x or y.", -1, 0,
+     0, 1, 1, 0},
+    {"axes_swapped", "x and y are exchanged.", "Exchange x and y.", 0, 1, 1, 0, 1, 0},
+    {"heading_turned", "Headings are half a turn off.", "Add pi to theta, or set marker.yaw.", 1, 0,
+     0, 1, 1, M_PI},
+    {"heading_turned", "Headings are a quarter turn off.", "Add pi/2 to theta, or set marker.yaw.",
+     1, 0, 0, 1, 1, M_PI / 2},
+    {"heading_turned", "Headings are a quarter turn off.",
+     "Subtract pi/2 from theta, or set marker.yaw.", 1, 0, 0, 1, 1, -M_PI / 2}};
 
 // As what a log is read: with its pieces' poses put right, in other units.
 struct LogReading {
@@ -150,14 +180,10 @@ std::optional<SanityFinding> check_outlines(const Problem& problem, double reach
     found = {name, seen + " Put right, by " + few_digits(1000 * put_m) + " mm. " + text, remedy};
   };
   for (const PoseFault& fault : kPoseFaults) {
-    if (fault.metres == 1) take({.fault = &fault}, fault.name, fault.text, fault.remedy);
+    take({.fault = &fault}, fault.name, fault.text, fault.remedy);
   }
   take({.exchanged = true}, kEndsSwapped, "Before and after are exchanged.", kExchangeEnds);
   if (found.severity == Severity::kNote && before_m < kApart * reach_m) return std::nullopt;
-  if (found.name == "sides_swapped") {
-    found.name = "axis_mirrored";
-    found.remedy = "Negate y and theta of the pieces, or mirror the finger's way.";
-  }
   return found;
 }
 

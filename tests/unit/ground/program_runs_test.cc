@@ -173,4 +173,43 @@ TEST(ProgramRuns, AProgramThatFailsIsTheError) {
   EXPECT_THAT(found.error().message, testing::HasSubstr("ended with status 9"));
 }
 
+// What a check names of a log whose poses are spoiled; the program goes `scale` times the way.
+std::string checked(const std::function<Pose(const Pose&)>& spoil, double scale = 1) {
+  Stream stream({7, Purpose::kTest, 0, 0, 0});
+  const auto draw = [&](double most) { return most * (2 * stream.uniform() - 1); };
+  RunLog log = driven({});
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses)
+      row.X_WM = spoil(row.X_WM * Pose{draw(0.01), draw(0.01), draw(0.02)});
+  }
+  Problem problem = problem_of();
+  for (const char* gain : {"v.gain", "omega.gain"}) {
+    problem.values[problem.table().row(gain)] = scale;
+  }
+  ProgramOfRuns farm;
+  const auto found = check_program_log(farm, problem, log, {{2}, 0.5});
+  EXPECT_TRUE(found.ok()) << (found ? "" : found.error().message);
+  EXPECT_EQ(farm.asked, 1u);
+  return found && *found ? (*found)->name : "";
+}
+
+TEST(ProgramRuns, ACheckNamesWhatOfPosesIsTheWrongWayRound) {
+  EXPECT_EQ(checked([](Pose X) { return Pose{1000 * X.x, 1000 * X.y, X.theta}; }), "unit_error");
+  EXPECT_EQ(checked([](Pose X) { return Pose{100 * X.x, 100 * X.y, X.theta}; }), "unit_error");
+  EXPECT_EQ(checked([](Pose X) { return Pose{-X.x, X.y, M_PI - X.theta}; }), "sides_swapped");
+  EXPECT_EQ(checked([](Pose X) { return Pose{X.x, X.y, -X.theta}; }), "heading_flipped");
+  EXPECT_EQ(checked([](Pose X) { return Pose{X.x, -X.y, X.theta}; }), "axes_mirrored");
+  EXPECT_EQ(checked([](Pose X) { return Pose{-X.x, X.y, X.theta}; }), "axes_mirrored");
+  EXPECT_EQ(checked([](Pose X) { return Pose{X.y, X.x, X.theta}; }), "axes_swapped");
+  EXPECT_EQ(checked([](Pose X) { return Pose{X.x, X.y, X.theta + M_PI / 2}; }), "heading_turned");
+  EXPECT_EQ(checked([](Pose X) { return Pose{X.x, X.y, X.theta + M_PI}; }), "heading_turned");
+}
+
+TEST(ProgramRuns, ACheckAsksNothingOfALogElsewhereNorOfAProgramThatIsNotTunedYet) {
+  const auto turned = [](Pose X) { return Pose{5000, -3000, 2} * X; };
+  EXPECT_EQ(checked([](Pose X) { return X; }), "");
+  for (const double scale : {0.3, 0.7, 1.0, 1.3, 3.0})
+    EXPECT_EQ(checked(turned, scale), "") << scale;
+}
+
 }  // namespace gapfarm::program_runs_test
