@@ -33,15 +33,7 @@ endif()
 
 # What gapfarm_share takes from.
 if(GAPFARM_SHARE)
-  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/headers.cc CONTENT "")
-  foreach(shared gapfarm_headers gapfarm_headers_cold)
-    add_library(${shared} OBJECT ${PROJECT_BINARY_DIR}/headers.cc)
-    target_link_libraries(${shared} PRIVATE Eigen3::Eigen)
-    target_compile_options(${shared} PRIVATE -fpch-preprocess)
-    target_precompile_headers(${shared} PRIVATE
-      <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map>
-      <memory> <optional> <set> <span> <sstream> <string> <string_view> <utility> <vector>
-      <Eigen/Dense>)
-  endforeach()
+  gapfarm_shared_headers(gapfarm_headers)
+  gapfarm_shared_headers(gapfarm_headers_cold)
   gapfarm_cold(gapfarm_headers_cold)
 endif()

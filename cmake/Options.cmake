@@ -61,18 +61,34 @@ function(gapfarm_linked target out)
   set(${out} ${found} PARENT_SCOPE)
 endfunction()
 
-# gapfarm_share(TARGET): takes the standard library's headers and Eigen's from what was parsed once
-# for all libraries (cmake/Dependencies.cmake), where GAPFARM_SHARE asks for it.  gcc keeps its
-# options with them: one for each optimisation.
+# gapfarm_shared_headers(NAME [HEADER...]): the standard library's headers, Eigen's and these, parsed
+# once for all that share them.
+function(gapfarm_shared_headers name)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/headers.cc CONTENT "")
+  add_library(${name} OBJECT ${PROJECT_BINARY_DIR}/headers.cc)
+  target_link_libraries(${name} PRIVATE Eigen3::Eigen)
+  target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache
+  target_precompile_headers(${name} PRIVATE
+    <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map>
+    <memory> <optional> <set> <span> <sstream> <string> <string_view> <utility> <vector>
+    <Eigen/Dense> ${ARGN})
+endfunction()
+
+# gapfarm_share(TARGET [FROM]): takes the headers of FROM, where GAPFARM_SHARE asks for it; of none
+# the libraries' (cmake/Dependencies.cmake).  gcc keeps its options with them: one for each
+# optimisation.
 function(gapfarm_share name)
   if(GAPFARM_SHARE)
     get_target_property(options ${name} COMPILE_OPTIONS)
-    if("${options}" MATCHES "-O1")
-      target_precompile_headers(${name} REUSE_FROM gapfarm_headers_cold)
+    if(ARGN)
+      set(from ${ARGN})
+    elseif("${options}" MATCHES "-O1")
+      set(from gapfarm_headers_cold)
     else()
-      target_precompile_headers(${name} REUSE_FROM gapfarm_headers)
+      set(from gapfarm_headers)
     endif()
-    target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache
+    target_precompile_headers(${name} REUSE_FROM ${from})
+    target_compile_options(${name} PRIVATE -fpch-preprocess)
   endif()
 endfunction()
 
