@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/try.h"
+#include "common/math/algebra.h"
 #include "common/math/laws.h"
 #include "common/score/density.h"
 
@@ -73,6 +74,29 @@ TailedDensity::TailedDensity(const NoiseTails& tails) : tails_(tails) {
   }
 }
 
+namespace {
+
+template <int N>
+struct SmallAxes {
+  Eigen::Matrix<double, N, 1> values;
+  Eigen::Matrix<double, N, N> vectors;
+};
+
+// Eigen has a solver of its own for three; the general one, made anew for a size that is seldom
+// asked for, is half of what this file takes to compile.
+template <int N>
+SmallAxes<N> axes_of(const Eigen::Matrix<double, N, N>& matrix) {
+  if constexpr (N == 3) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(matrix);
+    return {axes.eigenvalues(), axes.eigenvectors()};
+  } else {
+    const SymmetricAxes axes = axes_of_symmetric(matrix);
+    return {axes.values, axes.vectors};
+  }
+}
+
+}  // namespace
+
 template <int N>
 Result<double> TailedDensity::log_density_of(const Eigen::Matrix<double, N, 1>& residual,
                                              const Eigen::Matrix<double, N, N>& covariance,
@@ -89,9 +113,9 @@ Result<double> TailedDensity::log_density_of(const Eigen::Matrix<double, N, 1>& 
   const auto lower = readings->lower().template triangularView<Eigen::Lower>();
   const Matrix half = lower.solve(Matrix(covariance - reading));
   const Matrix drive = lower.solve(Matrix(half.transpose()));
-  const Eigen::SelfAdjointEigenSolver<Matrix> axes(drive);
-  const Array spread = axes.eigenvalues().array().max(0.0);
-  const Array squares = (axes.eigenvectors().transpose() * lower.solve(residual)).array().square();
+  const SmallAxes<N> axes = axes_of<N>(drive);
+  const Array spread = axes.values.array().max(0.0);
+  const Array squares = (axes.vectors.transpose() * lower.solve(residual)).array().square();
   std::array<double, kScales * kScales> logs;
   std::size_t count = 0;
   for (const ScalePair& pair : scales_) {

@@ -2,12 +2,12 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/math/algebra.h"
 #include "common/math/statistics.h"
 #include "master/report/figures/line_chart.h"
 #include "master/report/page_frame.h"
@@ -302,10 +302,10 @@ EndEllipse end_ellipse(std::span<const DrivenRun> runs, double coverage) {
   ellipse.heading_deviation_rad = std::sqrt(ellipse.heading_deviation_rad);
   // Chi-square of two degrees of freedom: P(r^2 <= q) = 1 - exp(-q / 2).
   const double q = -2 * std::log(1 - coverage);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(ellipse.covariance);
-  ellipse.minor_m = std::sqrt(q * std::max(0.0, axes.eigenvalues()[0]));
-  ellipse.major_m = std::sqrt(q * std::max(0.0, axes.eigenvalues()[1]));
-  ellipse.direction_rad = std::atan2(axes.eigenvectors()(1, 1), axes.eigenvectors()(0, 1));
+  const SymmetricAxes axes = axes_of_symmetric(ellipse.covariance);
+  ellipse.minor_m = std::sqrt(q * std::max(0.0, axes.values[0]));
+  ellipse.major_m = std::sqrt(q * std::max(0.0, axes.values[1]));
+  ellipse.direction_rad = std::atan2(axes.vectors(1, 1), axes.vectors(0, 1));
   return ellipse;
 }
 

@@ -2,7 +2,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -10,6 +9,7 @@
 #include <tuple>
 
 #include "common/base/ranges.h"
+#include "common/math/algebra.h"
 #include "common/pose/extent.h"
 #include "common/score/motion_model.h"
 #include "common/svg/svg.h"
@@ -89,14 +89,14 @@ struct Window {
 
 // Points of the 90 % ellipse in mm.
 std::vector<SvgPoint> ellipse_mm(const PoseCloud& cloud) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(cloud.cov.topLeftCorner<2, 2>());
-  const Eigen::Vector2d radii = kEllipse90 * axes.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const SymmetricAxes axes = axes_of_symmetric(cloud.cov.topLeftCorner<2, 2>());
+  const Eigen::Vector2d radii = kEllipse90 * axes.values.cwiseMax(0).cwiseSqrt();
   const double c = std::cos(cloud.mean.theta), s = std::sin(cloud.mean.theta);
   std::vector<SvgPoint> points;
   for (int i = 0; i < 72; ++i) {
     const double angle = 2 * std::numbers::pi * i / 72;
-    const Eigen::Vector2d p = axes.eigenvectors() * Eigen::Vector2d(radii[0] * std::cos(angle),
-                                                                    radii[1] * std::sin(angle));
+    const Eigen::Vector2d p =
+        axes.vectors * Eigen::Vector2d(radii[0] * std::cos(angle), radii[1] * std::sin(angle));
     points.push_back({1000 * (cloud.mean.x + c * p.x() - s * p.y()),
                       1000 * (cloud.mean.y + s * p.x() + c * p.y())});
   }
