@@ -16,6 +16,7 @@ namespace gapfarm::plan {
 namespace {
 
 constexpr double kMemory_s = 5;  // for which a command before a move still shows in it
+constexpr double kStands = 0.1;  // of a usual rate
 constexpr double kRest_s = 1;    // at the end
 constexpr double kPoseEvery_s = 0.1;
 constexpr double kMoves_s[] = {0.5, 1, 2, 4};
@@ -189,7 +190,10 @@ class Planner {
 
   std::optional<Chosen> choose(double most_s) {
     std::optional<Chosen> best;
-    double best_rate = 0;  // who stands still learns nothing
+    // Widths that shrink with the root of the time lose half a nat in all of it so far: who learns
+    // far less stands, before a wall that it cannot back away from.
+    const double usual_rate = 0.5 * static_cast<double>(wanted_.size()) / (before_s_ + t_s_);
+    double best_rate = t_s_ > 0 ? kStands * usual_rate : 0;
     const double before = spread(known_.widths());
     for (unsigned i = 0, tried = 0; i < settings_.pool && tried < 20 * settings_.pool; ++tried) {
       std::vector<Move> moves = {draw(most_s)};

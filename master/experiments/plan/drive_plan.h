@@ -49,9 +49,10 @@ struct DrivePlan {
 // Chooses moves two at a time: each channel at an end of its limits, half of it or 0, held for half
 // a second to four.  Those are taken which, a second, shrink the wanted widths most (the sum of
 // their logarithms) and keep the marker on the floor, which it begins in the middle of, also where
-// it stops after them.  Where none does, the robot is carried back to the middle: another run. Ends
-// at rest, and as soon as all that is wanted is as narrow as asked for.  Pure. Errors: a wanted
-// name that the robot does not have, a floor on which no move has room.
+// it stops after them.  Where none does, or none that does more than stand, the robot is carried
+// back to the middle: another run.  Ends at rest, and as soon as all that is wanted is as narrow as
+// asked for.  Pure.  Errors: a wanted name that the robot does not have, a floor on which no move
+// has room.
 Result<DrivePlan> plan_drive(const GroundRobot& robot, const DriveNoise& noise,
                              const DriveSettings& settings);
 

@@ -91,6 +91,26 @@ TEST(DrivePlan, IsTheSameAgainAndAnotherForAnotherSeed) {
   EXPECT_NE(first, values());
 }
 
+// It parked before the wall and held idle commands until the end.
+TEST(DrivePlan, WhatCannotBackAwayFromAWallIsCarriedToTheMiddle) {
+  const GroundRobot robot = robot_of(kCar);
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    DriveSettings settings = slow_wheels(30);
+    settings.limits = {{0, 0.6}, {-0.8, 0.8}};
+    settings.length_m = settings.width_m = 5;
+    settings.seed = seed;
+    for (const LoggedRun& run : planned(robot, settings).drive.runs) {
+      double idle_s = 0;
+      for (std::size_t i = 0; i < run.commands.size(); ++i) {
+        const double end_s =
+            i + 1 < run.commands.size() ? run.commands[i + 1].t_s : run.poses.back().t_s;
+        if (run.commands[i].values[0] == 0) idle_s += end_s - run.commands[i].t_s;
+      }
+      EXPECT_LT(idle_s, run.poses.back().t_s / 2) << seed << ", run " << run.run;
+    }
+  }
+}
+
 TEST(DrivePlan, NeedsHalfTheTimeOfSmoothDrivingAndLessThanRandomMoves) {
   for (const char* text : {kDifferential, kCar}) {
     const GroundRobot robot = robot_of(text);
