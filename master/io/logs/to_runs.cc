@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <numbers>
 #include <set>
 
 #include "common/base/ranges.h"
@@ -153,7 +154,14 @@ class Importer {
         continue;
       }
       const std::string name = run_name(table, run, r, part);
-      if (poses && values.size() > 4 && (map.intervals || before.count(name) != 0)) {
+      const bool leads_on = poses && (map.intervals || before.count(name) != 0);
+      if (leads_on && map.increments && std::abs(values[3]) > std::numbers::pi) {
+        return Error{table.source + ": found a turn of " + format_double(values[3]) + " rad in row " +
+                     std::to_string(r + 1) +
+                     ", expected at most half a turn of an increment; of degrees say so in the "
+                     "map: theta = { column = ..., unit = \"deg\" }"};
+      }
+      if (leads_on && values.size() > 4) {
         if (const auto fault = fault_of_noise(std::span(values).subspan(4))) {
           return Error{table.source + ": found " + fault->found + " in row " +
                        std::to_string(r + 1) + ", expected " + fault->expected + "; " +

@@ -153,6 +153,10 @@ TEST(Tables, IncrementsAreChainedFromWhereEachStretchBegins) {
     EXPECT_EQ(part.poses.size(), part.commands.size() + 1);
     EXPECT_EQ(part.poses[1].X_WM.x, moved_m);
   }
+  // Degrees that are taken for radians are not wrapped to some other turn.
+  const auto turned = to_runs({table_of("dt,l,r,x,y,a\n1,1,1,1,0,0\n1,1,1,1,0,270\n")}, *map);
+  ASSERT_FALSE(turned);
+  EXPECT_THAT(turned.error().message, HasSubstr("row 2, expected at most half a turn"));
   // Not where the wheels have a table of their own.
   const auto broken =
       to_runs({table_of("dt,x,y,a\n1,1,0,0\n1,,0,0\n"), table_of("dt,l,r\n1,1,1\n1,1,1\n")}, *map);
