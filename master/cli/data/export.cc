@@ -1,4 +1,7 @@
 // gapfarm export ros|ranges|runs: what a log says, in the words of its user's own tools.
+#include <spdlog/fmt/fmt.h>
+
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -13,6 +16,8 @@
 
 namespace gapfarm {
 namespace {
+
+constexpr double kSame = 1e-4;  // of a size, as files round it
 
 struct Reported {
   ReportedValues values;
@@ -69,16 +74,38 @@ Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, 
   return {};
 }
 
+// What is exported is in place of the robot's own values: the controller has to have the same.
+Status check_controller(const DriveFacts& file, const GroundRobot& robot,
+                        std::vector<ReportedValue> values) {
+  if (const auto& separation = robot.controller.wheel_separation_m) {
+    values.push_back({"wheel_separation", *separation, 0, {}, false});
+  }
+  for (const ReportedValue& row : values) {
+    const StatedNumber* stated = file.number(row.name);
+    if (stated == nullptr || std::abs(stated->value - row.had) <= kSame * std::abs(row.had)) {
+      continue;
+    }
+    return Error{fmt::format(
+        "{}: {} is {:.6g}, expected {:.6g} as the robot's file has it; what is exported is in "
+        "place of that: make robot.toml anew with gapfarm robot URDF --controllers {}",
+        file.place(stated->line), stated->key, stated->value, row.had, file.file)};
+  }
+  return {};
+}
+
 Result<RosExport> export_of(const ExportCommand& command, Console& console) {
   ASSIGN_OR_RETURN(auto reported_values, read_source_of_export(command.source, console));
+  const GroundRobot& robot = reported_values.values.given;
   RosExport data;
   data.source = command.source;
   data.logs = reported_values.values.logs;
-  data.controller = usual_controller(reported_values.values.given.drive);
+  data.controller = usual_controller(robot.drive);
   if (!command.controllers.empty()) {
     ASSIGN_OR_RETURN(const auto text, read_text_file(command.controllers));
     ASSIGN_OR_RETURN(const auto read, parse_controllers(text, command.controllers));
     data.controller = read.drives.front().name;
+    RETURN_IF_ERROR(
+        check_controller(read.drives.front(), robot, ros_values(reported_values.values)));
   }
   data.kinematics = reported_values.values.values;
   data.sizes = robot_sizes(reported_values.values);
@@ -86,7 +113,7 @@ Result<RosExport> export_of(const ExportCommand& command, Console& console) {
   data.values = ros_values(reported_values.values);
   data.remarks = ros_remarks(reported_values.values);
   data.friction = reported_values.friction;
-  RETURN_IF_ERROR(name_wheels_of_export(command.urdf, reported_values.values.given, &data));
+  RETURN_IF_ERROR(name_wheels_of_export(command.urdf, robot, &data));
   return data;
 }
 
