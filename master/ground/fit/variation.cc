@@ -71,6 +71,25 @@ Mixed fitted_to(const Windows& windows, const Eigen::MatrixXd& begin) {
   return mixed;
 }
 
+double log_likelihood(const Windows& windows, const Mixed& mixed) {
+  double sum = 0;
+  for (const EndedWindow* w : windows) {
+    const Eigen::Matrix3d S = spread_of(mixed, *w);
+    const Eigen::Vector3d off = w->residual + w->slopes * mixed.mean;
+    sum -= 0.5 * (std::log(S.determinant()) + off.dot(solve_symmetric(S, off)));
+  }
+  return sum;
+}
+
+// Values vary where that is likelier by more than a nat for each than that they do not: windows
+// that are a row each hardly distinguish it from errors of their ends.
+Mixed likeliest(const Windows& windows, const Eigen::MatrixXd& begin) {
+  Mixed varying = fitted_to(windows, begin);
+  Mixed constant = fitted_to(windows, 0 * begin);
+  const double gain = log_likelihood(windows, varying) - log_likelihood(windows, constant);
+  return gain > static_cast<double>(begin.rows()) ? varying : constant;
+}
+
 // What variances are to be multiplied by so that runs that are held out in turn are covered.
 double widening(const Windows& windows, const Eigen::MatrixXd& begin) {
   std::set<std::size_t> runs;
@@ -84,7 +103,7 @@ double widening(const Windows& windows, const Eigen::MatrixXd& begin) {
       const auto order = static_cast<std::size_t>(std::distance(runs.begin(), runs.find(w->run)));
       (order % folds == fold ? held_out : fitted).push_back(w);
     }
-    const Mixed mixed = fitted_to(fitted, begin);
+    const Mixed mixed = likeliest(fitted, begin);
     for (const EndedWindow* w : held_out) {
       if (mixed.errors.count(w->length) == 0) continue;
       const Eigen::Vector3d off = w->residual + w->slopes * mixed.mean;
@@ -108,7 +127,7 @@ Variation variation_of(const std::vector<EndedWindow>& windows, const Eigen::Mat
   Variation variation{
       Eigen::VectorXd::Zero(begin.rows()), Eigen::MatrixXd::Zero(begin.rows(), begin.cols()), {}};
   if (used.empty()) return variation;
-  const Mixed mixed = fitted_to(used, begin);
+  const Mixed mixed = likeliest(used, begin);
   const double wider = widening(used, begin);
   variation.shift = mixed.mean;
   variation.covariance = wider * mixed.covariance;

@@ -9,6 +9,7 @@
 #include "master/ground/reference.h"
 #include "master/ground/report/simulator_model.h"
 #include "tests/unit/ground/driven_log.h"
+#include "tests/unit/ground/scan_matched.h"
 
 namespace gapfarm::ranges_test {
 namespace {
@@ -71,6 +72,20 @@ TEST(Ranges, AreAsWideAsValuesVaryFromRunToRun) {
   EXPECT_GE(separation.sd, separation.varies);
   EXPECT_LT(range_of(ranges, "left_wheel_radius").varies, 0.05 * 0.004);
   EXPECT_LT(ranges.scatter[1].sd[2], 4e-3);  // turns are explained
+}
+
+// Errors of a scan matcher were taken for radii that vary by a fifth.
+TEST(Ranges, WhatAMatcherErrsByIsNotTheRobots) {
+  scan_matched::OfRows rows;
+  rows.deviations = {Eigen::Vector3d(10e-3, 0.5e-3, 10e-3)};
+  const GroundRobot robot = scan_matched::robot_by_its_maker();
+  const auto asked =
+      ask_what_changed(robot, scan_matched::driven(2, 41, scan_matched::kSensor, true, rows),
+                       {{scan_matched::kEachRow_s}, 0}, 1, nullptr, /*alone=*/true);
+  ASSERT_TRUE(asked) << asked.error().message;
+  const Ranges ranges = ranges_of(robot, *asked->reference);
+  EXPECT_LT(range_of(ranges, "left_wheel_radius").varies, 1e-4);
+  EXPECT_NEAR(ranges.scatter.front().sd[0], 10e-3, 2e-3);
 }
 
 TEST(Ranges, AreDrawnByTheirCovarianceWithinTheirBounds) {
