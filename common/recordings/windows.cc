@@ -5,6 +5,7 @@
 namespace gapfarm {
 namespace {
 
+constexpr double kGyroGap_s = 0.25;    // a longer one between two rates shows no turn
 constexpr double kSlack = 0.1;         // of a horizon: how much earlier a window may end
 constexpr double kGap = 1.5;           // horizons: a longer way to the next pose is a gap
 constexpr double kSpeedSpan_s = 0.25;  // over which the speed at a run's start is measured
@@ -168,6 +169,22 @@ WindowedRuns restart_at_measured_speed(const RunLog& log, WindowedRuns windows, 
     trial.run = static_cast<std::uint32_t>(windows.runs.size() - 1);
   }
   return windows;
+}
+
+std::optional<double> turned_between(const std::vector<CommandRow>& rates, double from_s,
+                                     double end_s) {
+  const auto first = std::ranges::upper_bound(rates, from_s, {}, &CommandRow::t_s);
+  if (first == rates.begin() || rates.empty() || rates.back().t_s < end_s) return {};
+  double turned = 0;
+  for (auto row = first - 1; row + 1 != rates.end() && row->t_s < end_s; ++row) {
+    const double begin = row->t_s, dt = (row + 1)->t_s - begin;
+    if (dt > kGyroGap_s) return {};
+    if (dt <= 0) continue;
+    const double a = std::max(from_s, begin), b = std::min(end_s, begin + dt);
+    const double middle = ((a + b) / 2 - begin) / dt;
+    turned += (b - a) * (row->values[0] + middle * ((row + 1)->values[0] - row->values[0]));
+  }
+  return turned;
 }
 
 }  // namespace gapfarm

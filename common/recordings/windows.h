@@ -7,6 +7,7 @@
 // measured pose.  Windows of one horizon share no stretch, and so no pose but their joint.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,5 +62,9 @@ WindowedRuns restart_at_measured_speed(const RunLog& log, WindowedRuns windows, 
 
 // As much as the delay may be searched for, and a second.
 inline constexpr double kWindowMargin_s = 2;
+
+// What a gyro turned by between two times, rad, its rates straight on between; none over a gap.
+std::optional<double> turned_between(const std::vector<CommandRow>& rates, double from_s,
+                                     double end_s);
 
 }  // namespace gapfarm

@@ -7,6 +7,7 @@
 #include "common/problem/run_files.h"
 #include "common/trials/files.h"
 #include "master/ground/reference.h"
+#include "master/io/log_checks/run_checks.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -45,7 +46,13 @@ Status check_ground(const Problem& problem, const std::string& source) {
 
 Result<GroundReference> fit_source(const GroundSource& source, Console& console) {
   const GroundRobot& robot = source.robot;
-  ASSIGN_OR_RETURN(const auto log, read_run_folders(source.logs, robot.channels));
+  ASSIGN_OR_RETURN(const auto logged, read_run_folders(source.logs, robot.channels));
+  const RunChecks checks = check_runs(logged, robot.motors.command_timeout_s);
+  for (const SanityFinding& f : checks.findings) {
+    if (checks.none_is_left(logged)) return Error{f.text + " " + f.remedy};
+    console.note("warning: " + f.text + " " + f.remedy);
+  }
+  const RunLog log = without(logged, checks);
   console.note("fitting the robot's kinematics to the log");
   // Increments err each by itself: a window of several knows nothing that they do not, unless
   // wheels were read at other times.

@@ -19,7 +19,6 @@ constexpr double kMargin_s = 11;  // of commands round a window: clocks may be 1
 // Of wheels that roll: what they slip by in the root of a metre of their way, m and rad. OptiOdom's
 // and a Create's whole runs end 0.01 to 0.05 off (docs/evidence/ground.md).
 constexpr double kSlip = 0.03;
-constexpr double kGyroGap_s = 0.25;  // a longer one between two rates shows no turn
 
 bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
   if (a.size() - from_a != b.size()) return false;
@@ -49,23 +48,6 @@ std::optional<Eigen::Matrix3d> noise_of_window(const LoggedRun& run, const Trial
     X = X * step;
   }
   return rotate_covariance(noise, -X.theta);
-}
-
-// What a gyro turned by between two times, its rates straight on between; none over a gap.
-std::optional<double> turned_between(const std::vector<CommandRow>& rates, double from_s,
-                                     double end_s) {
-  const auto first = std::ranges::upper_bound(rates, from_s, {}, &CommandRow::t_s);
-  if (first == rates.begin() || rates.empty() || rates.back().t_s < end_s) return {};
-  double turned = 0;
-  for (auto row = first - 1; row + 1 != rates.end() && row->t_s < end_s; ++row) {
-    const double begin = row->t_s, dt = (row + 1)->t_s - begin;
-    if (dt > kGyroGap_s) return {};
-    if (dt <= 0) continue;
-    const double a = std::max(from_s, begin), b = std::min(end_s, begin + dt);
-    const double middle = ((a + b) / 2 - begin) / dt;
-    turned += (b - a) * (row->values[0] + middle * ((row + 1)->values[0] - row->values[0]));
-  }
-  return turned;
 }
 
 void add_gyro(const RunLog& log, WindowSet* set) {

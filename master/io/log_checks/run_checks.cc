@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <string>
 
 #include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/pose/pose.h"
+#include "common/recordings/windows.h"
 #include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
@@ -28,7 +30,12 @@ constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;
 constexpr double kTimesAStep = 3;       // where half a turn is no more than a few of them
 constexpr std::size_t kNeighbours = 4;  // either way
 constexpr double kUsualShare = 0.8;     // of the steps are shorter: a tracker may lose some
-constexpr double kMostLost = 0.1;       // of a run or one pose, before the tracker found the robot
+// A gyro's slope over headings that are in degrees, and how much of both has to be the same.
+constexpr double kDegrees = 180 / std::numbers::pi, kAlike = 0.9, kMostRatio = 1.5;
+constexpr double kClockStep_s = 0.02, kMostClock_s = 0.5, kLateClock_s = 0.06;
+// What another clock has to leave of what the headings do not explain.
+constexpr double kLeftByClock = 0.5;
+constexpr double kMostLost = 0.1;  // of a run or one pose, before the tracker found the robot
 
 std::string name_of(const LoggedRun& run) { return "run " + run.run; }
 
@@ -86,7 +93,7 @@ void add_useless_runs(const RunLog& log, RunChecks* checks) {
     while (first < r && !is_copied(first)) ++first;
     Places* of = nullptr;
     if (never_moves(run) && is_commanded(run)) of = &still;
-    if (!is_commanded(run) && travels(run) && !log.relative) of = &driverless;
+    if (!is_commanded(run) && travels(run)) of = &driverless;
     if (of == nullptr && is_commanded(run) && is_slow(run)) of = &slow;
     if (first < r && run.poses.size() > 1 && of == nullptr) of = &copies;
     if (of == nullptr) continue;
@@ -275,12 +282,61 @@ void add_stale_commands(const RunLog& log, double timeout_s, RunChecks* checks) 
        Severity::kNote});
 }
 
+// How a gyro's turns go with those of the headings, its clock set back by `late_s`.
+struct GyroFit {
+  double slope = 0;  // of the gyro's over theirs
+  double alike = 0;  // their correlation
+};
+
+GyroFit fit_gyro(const RunLog& log, double late_s) {
+  double gg = 0, gh = 0, hh = 0;
+  for (const LoggedRun& run : log.runs) {
+    for (std::size_t i = 1; i < run.poses.size(); ++i) {
+      const PoseRow &a = run.poses[i - 1], &b = run.poses[i];
+      const auto g = turned_between(run.yaw_rates, a.t_s + late_s, b.t_s + late_s);
+      if (!g) continue;
+      const double h = wrap_angle(b.X_WM.theta - a.X_WM.theta);
+      gg += *g * *g, gh += *g * h, hh += h * h;
+    }
+  }
+  return gg > 0 && hh > 0 ? GyroFit{gh / hh, gh / std::sqrt(gg * hh)} : GyroFit{};
+}
+
+void check_gyro(const RunLog& log, RunChecks* checks) {
+  double late_s = 0;
+  GyroFit best = fit_gyro(log, 0);
+  const double left = 1 - best.alike * best.alike;
+  for (double s = -kMostClock_s; s <= kMostClock_s; s += kClockStep_s) {
+    const GyroFit fit = fit_gyro(log, s);
+    if (std::abs(fit.alike) <= std::abs(best.alike)) continue;
+    best = fit;
+    late_s = s;
+  }
+  const auto report = [&](const char* name, const std::string& text, const std::string& remedy) {
+    checks->gyro_is_wrong = true;
+    checks->findings.push_back({name, "The gyro's turns go with those of the headings " + text,
+                                remedy + " Its rates are omitted.", Severity::kWarning});
+  };
+  if (std::abs(best.alike) < kAlike) return;
+  if (best.slope < 0) report("gyro_sign", "the other way.", "Turn the sign of yaw_rate.");
+  const double degrees = std::abs(best.slope) / kDegrees;
+  if (degrees > 1 / kMostRatio && degrees < kMostRatio) {
+    report("gyro_unit", few_digits(std::abs(best.slope)) + " times, as degrees a second do.",
+           "Multiply yaw_rate by pi / 180.");
+  }
+  const bool explains = 1 - best.alike * best.alike < kLeftByClock * left;
+  if (std::abs(late_s) >= kLateClock_s && explains) {
+    report("gyro_clock", few_digits(late_s) + " s later.", "Take that from the gyro's times.");
+  }
+}
+
 }  // namespace
 
 RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s) {
   RunChecks checks;
   add_useless_runs(log, &checks);
   add_gaps(log, &checks);
+  check_gyro(log, &checks);
   if (timeout_s) add_stale_commands(log, *timeout_s, &checks);
   return checks;
 }
@@ -318,6 +374,9 @@ RunLog without(RunLog log, const RunChecks& checks) {
   for (auto pose = checks.false_poses.rbegin(); pose != checks.false_poses.rend(); ++pose) {
     std::vector<PoseRow>& poses = log.runs[pose->first].poses;
     poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(pose->second));
+  }
+  for (LoggedRun& run : log.runs) {
+    if (checks.gyro_is_wrong) run.yaw_rates.clear();
   }
   for (auto r = checks.useless.rbegin(); r != checks.useless.rend(); ++r) {
     log.runs.erase(log.runs.begin() + static_cast<std::ptrdiff_t>(*r));

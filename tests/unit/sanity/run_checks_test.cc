@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -149,6 +151,35 @@ TEST(RunChecks, AGapInTimeIsNoJump) {
   EXPECT_EQ(names_of(checks), std::vector<std::string>{"pose_gaps"});
   EXPECT_TRUE(check_jumps(log).findings.empty());
   EXPECT_NE(checks.findings[0].text.find("of run 1"), std::string::npos);
+}
+
+// A gyro beside two_runs(), whose rates are these times theirs and come so much later.
+RunLog with_gyro(double times, double late_s) {
+  RunLog log = two_runs();
+  for (LoggedRun& run : log.runs) {
+    Stream stream({.run_seed = 8});
+    for (double t = -1; t < 31; t += 0.02) {
+      // Turns that come and go, so that a clock shows.
+      const double true_s = t - late_s, rate = 0.4 * std::sin(0.9 * true_s);
+      run.yaw_rates.push_back({t, {times * rate + 0.01 * stream.normal()}});
+    }
+    for (std::size_t i = 0; i < run.poses.size(); ++i) {
+      run.poses[i].X_WM.theta = -0.4 / 0.9 * std::cos(0.9 * run.poses[i].t_s);
+    }
+  }
+  return log;
+}
+
+TEST(RunChecks, AGyroThatContradictsTheHeadingsIsOmitted) {
+  EXPECT_TRUE(check_runs(with_gyro(1.02, 0.01)).findings.empty());
+  const std::tuple<const char*, double, double> kCases[] = {
+      {"gyro_sign", -1, 0}, {"gyro_unit", 180 / std::numbers::pi, 0}, {"gyro_clock", 1, 0.2}};
+  for (const auto& [name, times, late_s] : kCases) {
+    const RunLog log = with_gyro(times, late_s);
+    const RunChecks checks = check_runs(log);
+    EXPECT_EQ(names_of(checks), std::vector<std::string>{name});
+    for (const LoggedRun& run : without(log, checks).runs) EXPECT_TRUE(run.yaw_rates.empty());
+  }
 }
 
 }  // namespace
