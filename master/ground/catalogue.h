@@ -19,6 +19,7 @@ class Catalogue {
 
   void wrong_commands();
   void wrong_poses();
+  void wrong_increments();
   void sizes();
   void steering();
   void motors();

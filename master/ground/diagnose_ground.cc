@@ -25,6 +25,11 @@ GroundQuestion ask_what_is_wrong(const GroundRobot& robot, const RunLog& log) {
   return question;
 }
 
+void set_sensor(const SensorValue& v, GroundRobot* robot) {
+  const bool x = v.row.name == "marker_x", y = v.row.name == "marker_y";
+  (x ? robot->X_RM.x : y ? robot->X_RM.y : robot->X_RM.theta) = v.value;
+}
+
 // The robot with the pose that increments give their sensor, and what is asked of it then: all but
 // that pose.
 Result<GroundRobot> sense(const GroundRobot& robot, const GroundDiagnoseOptions& options,
@@ -35,13 +40,12 @@ Result<GroundRobot> sense(const GroundRobot& robot, const GroundDiagnoseOptions&
   RETURN_IF_ERROR(settle_sensor(robot, options.windows, options.seed, log, question));
   GroundRobot sensed = robot;
   for (const SensorValue& v : question->sensor) {
-    const bool x = v.row.name == "marker_x", y = v.row.name == "marker_y";
-    (x ? sensed.X_RM.x : y ? sensed.X_RM.y : sensed.X_RM.theta) = v.value;
+    set_sensor(v, &sensed);
     for (KinematicRow& row : question->rows) {
       if (row.name != v.row.name) continue;
       row.nominal = v.value;
-      // Half of 90 % are 1.64 standard deviations.
-      row.tolerance = std::max(row.tolerance, (v.interval.upper - v.interval.lower) / 3.29);
+      row.tolerance =
+          std::max(row.tolerance, (v.interval.upper - v.interval.lower) / kNinetyDeviations);
     }
   }
   return sensed;
@@ -70,11 +74,14 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
     question = std::move(asked);
   }
   RETURN_IF_ERROR(exclude(options.excluded, &question.catalogue));
+  const std::string as_it_was = format_robot(file);
   if (log.relative && !options.reference) {
     clock.begin(kFaultStage);
     ASSIGN_OR_RETURN(auto sensed, sense(robot, options, &log, &question));
     robot = std::move(sensed);
-    file.X_RM = robot.X_RM;
+    for (const SensorValue& v : question.sensor) {
+      if (v.shown) set_sensor(v, &file);
+    }
   }
   GroundWork work = options;
   work.on_stage = [&](const std::string& stage) { clock.begin(stage); };
@@ -84,7 +91,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
   GroundDiagnosis result = report_ground(robot, search, options);
   result.corrected = robot_with(file, chosen_values(search, result.values));
   if (search.faults.empty() && !search.reference && !search.windows.simulated &&
-      !result.diagnosis.effects.empty() && format_robot(result.corrected) == format_robot(file)) {
+      !result.diagnosis.effects.empty() && format_robot(result.corrected) == as_it_was) {
     result.diagnosis.action = "The robot's file has no word for that, and stays as it is.";
   }
   clock.begin("");

@@ -51,6 +51,11 @@ void Catalogue::sizes() {
         {{"travel", 1, share, "ratio", "-"}});
   value("wheel_separation", {"icr_track", "friction_anisotropy"},
         "the distance between the sides, as they roll", {row("separation")});
+  // A file that was made with a ruler is off in all of them.
+  KinematicRow left = row("left"), right = row("right"), apart = row("separation");
+  left.key = "left", right.key = "right", apart.key = "separation";
+  value("wheel_radius", {"wheel_separation", "motor_asymmetry"}, "the size of the robot",
+        {left, right, apart});
 }
 
 void Catalogue::steering() {
@@ -162,6 +167,7 @@ std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
   Catalogue catalogue(robot, rows);
   catalogue.wrong_commands();
   catalogue.wrong_poses();
+  catalogue.wrong_increments();
   catalogue.floors();
   catalogue.sizes();
   catalogue.steering();
@@ -190,6 +196,7 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
   Catalogue catalogue(robot, kinematic_rows(robot));
   catalogue.wrong_commands();
   catalogue.wrong_poses();
+  catalogue.wrong_increments();
   catalogue.sizes();
   catalogue.steering();
   catalogue.motors();
@@ -206,18 +213,24 @@ void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows) {
 }
 
 std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all) {
-  if (log.relative) std::erase_if(all, [](const GroundHypothesis& h) { return h.of_world; });
+  std::erase_if(
+      all, [&](const GroundHypothesis& h) { return log.relative ? h.of_world : h.of_increments; });
   for (GroundHypothesis& h : all) {
     // In a mirrored world every turn and every step aside is the other way, as if the robot's own
-    // had been taken for one another, and so they are for a sensor that hangs upside down.
+    // had been taken for one another, and so they are for a sensor that hangs upside down.  The
+    // inverse of an increment is the way back, as a sensor that looks back sees the sides swapped.
     if (h.name != "sides_swapped" && h.name != "steering_reversed") continue;
     const std::string other =
         log.relative ? "a sensor that is mounted upside down" : "y and headings both mirrored";
-    h.thing += " (or " + other + ")";
+    h.thing += " (or " + other + (log.relative ? ", or increments that are inverted)" : ")");
     h.remedy +=
         " If it is " + other +
         ", turn the signs of y and theta instead, and diagnose again: other values hold then.";
     h.aliases.emplace_back(log.relative ? "sensor_upside_down" : "axes_mirrored");
+    if (!log.relative) continue;
+    h.aliases.emplace_back("increments_inverted");
+    h.remedy +=
+        " If each increment is the earlier pose in the later one's frame, invert them instead.";
   }
   GroundHypothesis gyro{kGyroScale, {}, "the scale of the gyro", {}};
   add_gyro_scale(log, &gyro.freed);

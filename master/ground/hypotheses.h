@@ -43,11 +43,12 @@ struct GroundHypothesis {
   std::function<void(RunLog*)> put_right = {};
   double metres = 1;  // logged positions times this are metres
   std::string remedy = {};
-  bool only_more = false;  // less than 0 has no meaning
-  double price = 0;        // nats that it must gain more, having more values than others
-  bool of_world = false;   // acts in a place or along an axis of the world
-  double radians = 1;      // logged headings times this are radians
-  double kept = 0;         // of a change: so much of it comes and goes with where a robot drives
+  bool only_more = false;      // less than 0 has no meaning
+  double price = 0;            // nats that it must gain more, having more values than others
+  bool of_world = false;       // acts in a place or along an axis of the world
+  bool of_increments = false;  // of relative poses alone
+  double radians = 1;          // logged headings times this are radians
+  double kept = 0;  // of a change: so much of it comes and goes with where a robot drives
   // Parameters and text of the named effect; empty: its values' own.
   std::function<void(const WindowFitter&, const WindowFit&, std::uint64_t seed, NamedEffect*)>
       describe = {};

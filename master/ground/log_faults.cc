@@ -43,12 +43,18 @@ Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog
 
 std::optional<GroundFault> best_fault(
     const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
-    const WindowSettings& settings, double before, bool anywhere,
+    const WindowSettings& settings, double before, bool anywhere, std::span<const FoundFault> found,
     const std::function<double(const WindowFitter&, const RunLog&)>& objective_of) {
   std::optional<GroundFault> best;
   for (std::size_t i = 0; i < question.catalogue.size(); ++i) {
     const GroundHypothesis& h = question.catalogue[i];
     if (!h.put_right || (anywhere && h.of_world)) continue;
+    // One column has one unit.
+    const auto is_again = [&](const FoundFault& f) {
+      const GroundHypothesis& other = question.catalogue[f.hypothesis];
+      return other.name == h.name && other.aliases == h.aliases;
+    };
+    if (std::ranges::any_of(found, is_again)) continue;
     GroundFault fault{{i, 0}, 1, log, 0};
     h.put_right(&fault.log);
     const auto windows = question.windows(robot, fault.log, settings);
@@ -68,7 +74,8 @@ std::optional<GroundFault> best_fault(
 
 std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
                                              const GroundQuestion& question,
-                                             const WindowSettings& settings) {
+                                             const WindowSettings& settings,
+                                             std::span<const FoundFault> found) {
   const std::vector<FitRow> rows = held_rows(question.rows);
   const auto objective_of = [&](const WindowFitter& fitter, const RunLog&) {
     return fitter.hold(rows, nominals(rows)).objective;
@@ -76,7 +83,8 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
   const auto as_logged = question.windows(robot, log, settings);
   if (!as_logged) return std::nullopt;
   const double before = objective_of(WindowFitter(robot, *as_logged, question.reference), log);
-  return best_fault(robot, log, question, settings, before, /*anywhere=*/false, objective_of);
+  return best_fault(robot, log, question, settings, before, /*anywhere=*/false, found,
+                    objective_of);
 }
 
 namespace {
@@ -127,13 +135,15 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
   for (;;) {
     const bool settled = !question.sensor.empty() || search->faults.size() >= kMostFaults;
     auto fault =
-        settled ? std::nullopt : find_ground_fault(robot, search->log, question, work.windows);
+        settled ? std::nullopt
+                : find_ground_fault(robot, search->log, question, work.windows, search->faults);
     ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, work.windows));
     search->windows = std::move(windows);
     const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
     search->fit = fitter.fit(held_rows(question.rows));
+    if (!fault) break;
     // Values a little off must not do as well, nor must a clock that is far off.
-    if (!fault || fault->objective < search->fit.objective) break;
+    if (fault->objective < search->fit.objective) break;
     const double delayed = objective_with_own_clock(fitter, search->fit.rows, search->fit.values);
     if (fault->objective < delayed) break;
     search->faults.push_back(*fault);

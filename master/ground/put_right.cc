@@ -18,20 +18,32 @@ std::function<void(RunLog*)> change_commands(std::function<void(std::vector<doub
   };
 }
 
+std::function<void(RunLog*)> change_increments(
+    std::function<Pose(const Pose& before, const Pose& increment)> next) {
+  return [next = std::move(next)](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      Pose before, after;
+      for (PoseRow& row : run.poses) {
+        after = next(after, between(before, row.X_WM));
+        before = std::exchange(row.X_WM, after);
+      }
+    }
+  };
+}
+
 std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn) {
   const auto changed = [L, turn](const Pose& X) {
     const Eigen::Vector3d v = L * Eigen::Vector3d(X.x, X.y, X.theta);
     return Pose{v[0], v[1], turn == 0 ? v[2] : wrap_angle(v[2] - turn)};
   };
-  return [L, changed](RunLog* log) {
+  const auto chained = change_increments(
+      [changed](const Pose& before, const Pose& X) { return before * changed(X); });
+  return [L, changed, chained](RunLog* log) {
+    if (log->relative) chained(log);
     for (LoggedRun& run : log->runs) {
-      Pose before, after;
       for (PoseRow& row : run.poses) {
-        const Pose logged = row.X_WM;
-        row.X_WM = log->relative ? after * changed(between(before, logged)) : changed(logged);
+        if (!log->relative) row.X_WM = changed(row.X_WM);
         if (row.noise) *row.noise = (L * *row.noise * L.transpose()).eval();
-        before = logged;
-        after = row.X_WM;
       }
     }
   };

@@ -16,6 +16,10 @@ std::function<void(RunLog*)> change_commands(std::function<void(std::vector<doub
 // noise goes with it.
 std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn = 0);
 
+// The poses of a relative log, each anew from the new one before it and the increment as logged.
+std::function<void(RunLog*)> change_increments(
+    std::function<Pose(const Pose& before, const Pose& increment)> next);
+
 // Repeats each command every `step_s`, until the next or the last pose, as its sender did.
 std::function<void(RunLog*)> hold_commands(double step_s);
 

@@ -199,7 +199,7 @@ std::optional<GroundFault> fault_of_increments(const GroundRobot& robot, const R
                                                const GroundQuestion& question,
                                                const WindowFit& fit) {
   return best_fault(robot, log, question, settings, fit.objective, /*anywhere=*/true,
-                    [&](const WindowFitter& fitter, const RunLog& right) {
+                    question.faults, [&](const WindowFitter& fitter, const RunLog& right) {
                       return open_fit(fitter, robot, question.rows, right, kFaultRounds).objective;
                     });
 }
@@ -216,6 +216,21 @@ const GroundHypothesis* fault_of(const GroundRobot& robot, const RunLog& log,
     fault = fault_of_increments(robot, log, settings, question, fit);
   }
   return fault ? &question.catalogue[fault->hypothesis] : nullptr;
+}
+
+// Whether a log shows a row, by how sure it makes it.  The place of a sensor on the robot turns
+// with the way it looks: where nothing shows the one, nothing shows the other.
+std::vector<char> shown_rows(const WindowFit& fit, const Eigen::VectorXd& deviations) {
+  std::vector<char> shown;
+  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+    shown.push_back(deviations[k] < kUnshown * prior_deviation(fit.rows[k]));
+  }
+  const Eigen::Index yaw = row_index(fit.rows, "marker_yaw");
+  if (yaw < 0 || !fit.rows[yaw].free || shown[yaw]) return shown;
+  for (const char* place : {"marker_x", "marker_y"}) {
+    if (const Eigen::Index k = row_index(fit.rows, place); k >= 0) shown[k] = false;
+  }
+  return shown;
 }
 
 GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
@@ -236,11 +251,8 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
     Stream stream({seed, Purpose::kStatistics, 2, 0, 0});
     for (double& off : reference.draws.row(grip)) off += unsure * stream.normal();
   }
-  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-    const auto draws = reference.draws.row(k);
-    const double deviation = draws.norm() / std::sqrt(static_cast<double>(draws.size()));
-    reference.shown.push_back(deviation < kUnshown * prior_deviation(fit.rows[k]));
-  }
+  const auto draws = static_cast<double>(reference.draws.cols());
+  reference.shown = shown_rows(fit, reference.draws.rowwise().norm() / std::sqrt(draws));
   reference.covariance =
       reference.draws * reference.draws.transpose() / static_cast<double>(reference.draws.cols());
   return reference;
@@ -333,11 +345,14 @@ Status settle_sensor(const GroundRobot& robot, const WindowSettings& settings, s
       continue;
     }
     const Eigen::MatrixX2d bounds = fitter.intervals(fit, seed);
+    const std::vector<char> shown =
+        shown_rows(fit, (bounds.col(1) - bounds.col(0)) / kNinetyDeviations);
     for (std::size_t k = 0; k < fit.rows.size(); ++k) {
       const KinematicRow& row = question->rows[k];
       if (!row.name.starts_with("marker_")) continue;
       const double had = value_in_file(robot, row.name);
-      question->sensor.push_back({row, had, fit.values[k], {bounds(k, 0), bounds(k, 1)}});
+      question->sensor.push_back(
+          {row, had, fit.values[k], {bounds(k, 0), bounds(k, 1)}, shown[k] != 0});
     }
     return {};
   }

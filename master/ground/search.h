@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,7 @@ struct SensorValue {
   double had = 0;  // by the robot's file
   double value = 0;
   Interval interval;  // 90 %
+  bool shown = true;  // by the log; else it is as good as any other
 };
 
 struct FoundFault {
@@ -122,16 +124,18 @@ struct GroundFault : FoundFault {
 
 // The fault of the log that, put right, explains it best; nothing where none gains on `before`, or
 // residuals shrink too little.  `objective_of`: the nats of a log that was put right.
-// `anywhere`: without those that act along an axis of the world.
+// `anywhere`: without those that act along an axis of the world; `found`: what was put right
+// before.
 std::optional<GroundFault> best_fault(
     const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
-    const WindowSettings& settings, double before, bool anywhere,
+    const WindowSettings& settings, double before, bool anywhere, std::span<const FoundFault> found,
     const std::function<double(const WindowFitter&, const RunLog&)>& objective_of);
 
 // The same by the file's values, far better than with the log as it is.  In no time: no row moves.
 std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
                                              const GroundQuestion& question,
-                                             const WindowSettings& settings);
+                                             const WindowSettings& settings,
+                                             std::span<const FoundFault> found = {});
 
 // Takes stale frames out of the search's log, puts right what is the wrong way round, finds the
 // grid of the poses, and fits what stands as it does.  Errors: no window fits.

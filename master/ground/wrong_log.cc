@@ -192,4 +192,14 @@ void Catalogue::wrong_poses() {
   }
 }
 
+void Catalogue::wrong_increments() {
+  fault("increments_in_world", {"axes_turned"},
+        "the axes of the increments: they are the world's, not the robot's",
+        "Turn x and y of each increment by less the heading before it.",
+        change_increments([](const Pose& before, const Pose& X) {
+          return Pose{before.x + X.x, before.y + X.y, wrap_angle(before.theta + X.theta)};
+        }))
+      .of_increments = true;
+}
+
 }  // namespace gapfarm

@@ -342,7 +342,7 @@ std::vector<ReportedValue> GroundReport::reported_values() const {
                       interval, row.free || known || search_.reference.has_value()});
     for (const SensorValue& v : search_.sensor) {
       if (v.row.name != row.row.name) continue;
-      values.back() = {v.row.name, v.had, v.value, v.interval, true};
+      values.back() = {v.row.name, v.had, v.value, v.interval, v.shown};
     }
   }
   return values;

@@ -174,11 +174,14 @@ int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis) 
   std::string pose;
   for (const SensorValue& v : sensor) {
     const auto& [lo, hi] = v.interval;
-    const std::string text = fmt::format(
-        "marker.{} {:.4g} [{:.4g}, {:.4g}] {}; the file has {:.4g}",
-        v.row.name.substr(v.row.name.find('_') + 1), v.value, lo, hi, v.row.unit, v.had);
+    const std::string key = "marker." + v.row.name.substr(v.row.name.find('_') + 1);
+    const std::string text = v.shown
+                                 ? fmt::format("{} {:.4g} [{:.4g}, {:.4g}] {}; the file has {:.4g}",
+                                               key, v.value, lo, hi, v.row.unit, v.had)
+                                 : key + ": this log does not show it";
     pose += " " + text + ".";
     const double off = v.value - v.had;
+    if (!v.shown) continue;
     if (std::abs(off) < 2 * v.row.tolerance || (lo <= v.had && v.had <= hi)) continue;
     NamedEffect& effect = v.row.name == "marker_yaw" ? yaw : offset;
     effect.parameters.push_back({v.row.key, off, lo - v.had, hi - v.had, v.row.unit});

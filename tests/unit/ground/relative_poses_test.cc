@@ -203,6 +203,55 @@ TEST(RelativePoses, ReportThatTheSensorMayBeUpsideDown) {
   EXPECT_TRUE(check_ground_log(robot_by_its_maker(), driven(2, 31, {0.1, 0.02, 1.6})).empty());
 }
 
+// A heading that no drive showed was named, one of eight that fits began at.
+TEST(RelativePoses, OfATurningRobotTheSensorsPoseStaysAsTheFileHasIt) {
+  Stream stream({36, Purpose::kTest, 0, 0, 0});
+  std::vector<WheelSpeeds> rows;
+  for (int k = 0; k < 120; ++k) {
+    const double left = 6 * stream.uniform() - 3;
+    rows.push_back({left, -left * kLeft_m / kRight_m});
+  }
+  const RunLog log = log_of({scanned("1", rows, kSensor, {}, stream)});
+  const auto found = diagnose_ground(robot_by_its_maker(), log, {});
+  ASSERT_TRUE(found) << found.error().message;
+  for (const NamedEffect& effect : found->diagnosis.effects) {
+    EXPECT_FALSE(effect.name.starts_with("marker")) << effect.text;
+  }
+  EXPECT_EQ(found->corrected.X_RM, robot_by_its_maker().X_RM);
+  const Calibration said(log);
+  EXPECT_FALSE(said("marker_yaw").shown);
+  EXPECT_FALSE(said("marker_x").shown);
+}
+
+// Its right wheel alone was put farther from the truth, within a sixth of what it was off by.
+TEST(RelativePoses, AFileThatIsOffInEverythingIsCorrectedInEverything) {
+  const auto found = diagnose_ground(robot_by_its_maker(), driven(1, 37), {});
+  ASSERT_TRUE(found) << found.error().message;
+  for (const RobotWheel& wheel : found->corrected.wheels) {
+    if (!wheel.driven) continue;
+    const double r = wheel.side == WheelSide::kLeft ? kLeft_m : kRight_m;
+    EXPECT_NEAR(*wheel.radius_m, r, 8e-3 * r);
+  }
+  EXPECT_NEAR(*found->corrected.controller.wheel_separation_m, kSeparation_m, 8e-3 * kSeparation_m);
+  EXPECT_EQ(found->diagnosis.verdict, Verdict::kEffect) << found->diagnosis.headline;
+}
+
+// Wheels and sensor were bent until some of it fitted.
+TEST(RelativePoses, AxesOfTheWorldAreFound) {
+  RunLog log = driven(2, 31);
+  for (LoggedRun& run : log.runs) {
+    Pose before, after;
+    for (PoseRow& row : run.poses) {
+      const Pose step{row.X_WM.x - before.x, row.X_WM.y - before.y, row.X_WM.theta - before.theta};
+      before = row.X_WM;
+      row.X_WM = after = after * step;
+    }
+  }
+  const auto found = check_ground_log(robot_by_its_maker(), log);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].name, "increments_in_world");
+}
+
 TEST(RelativePoses, NameNothingThatHasAPlace) {
   const auto diagnosis = diagnose_ground(robot_by_its_maker(), driven(6, 32), {});
   ASSERT_TRUE(diagnosis) << diagnosis.error().message;
