@@ -14,6 +14,7 @@ enum class ErrorCode {
   kOther,
   kStopped,     // by request
   kSimulation,  // a simulation did not end well, or cannot be asked for
+  kNoProgram,   // a user's program cannot be started, or is another one
 };
 
 struct Error {

@@ -206,10 +206,11 @@ ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineLimits 
 Result<std::string> ExternalSimulator::introduce() {
   if (program_.running()) return introduction_;
   const Result<std::string> line = program_.ask(hello_line());
-  if (!line) return line;
+  if (!line) return Error{line.error().message, ErrorCode::kNoProgram};
   if (const auto declaration = parse_declaration(*line); !declaration) {
     program_.kill();
-    return Error{"external program '" + program_.name() + "' " + declaration.error().message};
+    return Error{"external program '" + program_.name() + "' " + declaration.error().message,
+                 ErrorCode::kNoProgram};
   }
   introduction_ = *line;
   return introduction_;
@@ -220,9 +221,11 @@ Result<Answer> ExternalSimulator::ask(Request& request, const std::string& decla
   ASSIGN_OR_RETURN(const std::string introduction, introduce());
   if (introduction != declared) {
     program_.kill();
-    return Error{"external program '" + program_.name() +
-                 "' declares other things than when the problem was made; check the config again, "
-                 "and give every machine the same program"};
+    return Error{
+        "external program '" + program_.name() +
+            "' declares other things than when the problem was made; check the config again, "
+            "and give every machine the same program",
+        ErrorCode::kNoProgram};
   }
   request.id = ++asked_;
   const std::string question = request_line(request);

@@ -76,14 +76,15 @@ class ExternalSimulator {
   ExternalSimulator(const ExternalCommand& command, LineLimits limits, Clock clock);
 
   // The line in which it introduces itself; starts it if it does not run.  Errors: LineProgram's
-  // and parse_declaration()'s.
+  // and parse_declaration()'s, of code kNoProgram: none was asked for values.
   Result<std::string> introduce();
 
   void while_waiting(std::function<void()> call) { program_.while_waiting(std::move(call)); }
 
   // `declared`: the line that the problem was made with; a program that now declares something else
-  // is an error.  Sets the request's id.  Errors name the program and what it did, then in a second
-  // line how to ask it the same by hand, and leave it dead: the next question starts it again.
+  // is an error of code kNoProgram.  Sets the request's id.  Errors name the program and what it
+  // did, then in a second line how to ask it the same by hand, and leave it dead: the next question
+  // starts it again.
   Result<ExternalAnswer> simulate(ExternalRequest& request, const std::string& declared) {
     return ask<ExternalAnswer>(request, declared);
   }

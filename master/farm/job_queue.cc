@@ -48,7 +48,8 @@ const char* verb(EndCause cause) {
 }
 
 bool is_answer(const v1::TaskResult& result) {
-  return result.outcome() != v1::OUTCOME_UNSPECIFIED && v1::Outcome_IsValid(result.outcome());
+  return result.outcome() != v1::OUTCOME_UNSPECIFIED && result.outcome() != v1::WORKER_UNFIT &&
+         v1::Outcome_IsValid(result.outcome());
 }
 
 }  // namespace
@@ -179,6 +180,7 @@ void JobQueue::withdraw(Attempt& attempt, std::uint64_t id) {
 
 Committed JobQueue::commit(const WorkerIdentityPtr& worker, v1::JobResult* result) {
   Committed committed;
+  if (result->result().outcome() == v1::WORKER_UNFIT) committed.kind = Commit::kUnfit;
   if (!is_answer(result->result())) return committed;
   if (opinions_.compare(worker, *result, &committed.disagreement)) {
     committed.kind = Commit::kCompared;

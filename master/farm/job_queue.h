@@ -37,6 +37,7 @@ struct CopyOptions {
 enum class Commit {
   kDone,      // the job's first answer
   kLate,      // it had one already
+  kUnfit,     // the worker cannot work on the problem; the job is still out
   kNoAnswer,  // to a job of this worker's, but nothing that answers() it
   kCompared,  // an audit's answer, or one to a job of an earlier batch, that was waited for
   kForeign,   // not an answer to anything that this worker was given

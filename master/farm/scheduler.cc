@@ -258,9 +258,14 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double no
   if (committed.kind == Commit::kNoAnswer) {
     // Broken or lying: nothing else that it says is worth waiting for.
     ++tally_.malformed;
-    const std::string reason = "it answered a task with something that is no result of it";
-    post(worker.peer).mutable_refusal()->set_reason(reason);
-    dismiss(worker, FarmEvent::kBadMessage, "is refused: " + reason);
+    refuse(worker, FarmEvent::kBadMessage, "it answered a task with something that is no result");
+    return false;
+  }
+  if (committed.kind == Commit::kUnfit) {
+    const bool alone = registry_.size() == 1;
+    refuse(worker, FarmEvent::kRefused,
+           "it cannot work on this problem: " + result->result().message() +
+               (alone ? "; no worker that can is left" : ""));
     return false;
   }
   // Nonsense about a job leaves it in the worker's hands, to be given back with the rest of them.
@@ -383,18 +388,6 @@ void Scheduler::on_tick(double now) {
     dismiss(worker, FarmEvent::kSilent, "was not heard of for too long");
   }
   dispatch(now);
-}
-
-void Scheduler::send_goodbye(const std::string& reason, bool over) {
-  std::vector<std::string> peers = fleets_.peers();
-  for (const auto& [id, worker] : registry_.all()) peers.push_back(worker->peer);
-  leaving_ = true;
-  unanswered_.insert(peers.begin(), peers.end());
-  for (const std::string& peer : unanswered_) {
-    v1::Goodbye* goodbye = post(peer).mutable_goodbye();
-    goodbye->set_reason(reason);
-    goodbye->set_over(over);
-  }
 }
 
 }  // namespace gapfarm

@@ -135,6 +135,7 @@ class Scheduler {
   template <class List>
   void keep_only(WorkerRecord& worker, const List& keeps, double held_since_before);
   std::string values_of_task(const v1::Task& task) const;
+  void refuse(WorkerRecord& worker, FarmEvent::Kind kind, const std::string& reason);
   void dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::string& text);
   void cancel_all();
   void cancel(const Losers& losers);

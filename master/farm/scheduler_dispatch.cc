@@ -133,6 +133,23 @@ void Scheduler::on_fleet(const std::string& peer, const v1::Fleet& fleet, double
   }
 }
 
+void Scheduler::refuse(WorkerRecord& worker, FarmEvent::Kind kind, const std::string& reason) {
+  post(worker.peer).mutable_refusal()->set_reason(reason);
+  dismiss(worker, kind, "is refused: " + reason);
+}
+
+void Scheduler::send_goodbye(const std::string& reason, bool over) {
+  std::vector<std::string> peers = fleets_.peers();
+  for (const auto& [id, worker] : registry_.all()) peers.push_back(worker->peer);
+  leaving_ = true;
+  unanswered_.insert(peers.begin(), peers.end());
+  for (const std::string& peer : unanswered_) {
+    v1::Goodbye* goodbye = post(peer).mutable_goodbye();
+    goodbye->set_reason(reason);
+    goodbye->set_over(over);
+  }
+}
+
 FarmTally Scheduler::tally() const {
   FarmTally tally = tally_;
   tally.compared = queue_.compared();

@@ -12,11 +12,12 @@ namespace {
 
 class ExternalFailure : public std::exception {
  public:
-  explicit ExternalFailure(std::string message) : message_(std::move(message)) {}
-  const char* what() const noexcept override { return message_.c_str(); }
+  explicit ExternalFailure(Error error) : error_(std::move(error)) {}
+  const char* what() const noexcept override { return error_.message.c_str(); }
+  v1::Outcome outcome() const { return outcome_of(error_); }
 
  private:
-  std::string message_;
+  Error error_;
 };
 
 ExternalSide external_side(const SideDrive& side) {
@@ -49,11 +50,11 @@ class ExternalVehicle final : public Vehicle {
                       patch.radius_m,
                       patch.ratio};
     if (path != nullptr && !(request_.declaration->inputs & kExternalPath)) {
-      throw ExternalFailure("external program '" + request_.declaration->name +
-                            "' does not declare the input \"path\": there are only end poses");
+      throw ExternalFailure({"external program '" + request_.declaration->name +
+                             "' does not declare the input \"path\": there are only end poses"});
     }
     const auto answer = ask_program(*simulator_, request_, *problem_.external, steps_);
-    if (!answer) throw ExternalFailure(answer.error().message);
+    if (!answer) throw ExternalFailure(answer.error());
     Motion motion;
     motion.outcome = answer->diverged ? MotionOutcome::kDiverged : MotionOutcome::kOk;
     motion.X_SE = answer->X_SE;
@@ -106,7 +107,7 @@ class ExternalRuns final : public WindowModel {
       }
       request.times_s = times;
       const auto answer = ask_program(*simulator_, request, *problem_.external, steps);
-      if (!answer) throw ExternalFailure(answer.error().message);
+      if (!answer) throw ExternalFailure(answer.error());
       return motion_of(*answer, start, times);
     };
     return {{at(values, "marker.x"), at(values, "marker.y"), at(values, "marker.yaw")}, run};
@@ -151,7 +152,7 @@ class ExternalModel final : public ScenarioModel {
     try {
       return model_->predict(values, options);
     } catch (const ExternalFailure& failure) {
-      prediction.outcome = v1::WORKER_FAILED;
+      prediction.outcome = failure.outcome();
       prediction.message = failure.what();
     }
     return prediction;
@@ -174,7 +175,7 @@ class ExternalModel final : public ScenarioModel {
     try {
       return work();
     } catch (const ExternalFailure& failure) {
-      return failed_task(v1::WORKER_FAILED, failure.what());
+      return failed_task(failure.outcome(), failure.what());
     }
   }
 

@@ -32,7 +32,7 @@ class ObjectiveModel final : public ScenarioModel {
     v1::TaskResult result;
     result.set_message(answer ? answer->message : answer.error().message);
     if (!answer) {
-      result.set_outcome(v1::WORKER_FAILED);
+      result.set_outcome(outcome_of(answer.error()));
     } else if (answer->diverged) {
       result.set_outcome(v1::DIVERGED);
     } else {

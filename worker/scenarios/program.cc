@@ -23,7 +23,7 @@ std::shared_ptr<ExternalSimulator> shared_simulator(const ExternalCommand& comma
 std::optional<v1::TaskResult> refuse_to_start() {
   if (external_programs_allowed()) return std::nullopt;
   return failed_task(
-      v1::INVALID_REQUEST,
+      v1::WORKER_UNFIT,
       "this worker starts no programs that a master names; start it with --allow-external, and "
       "only for a master that you trust with its machine");
 }

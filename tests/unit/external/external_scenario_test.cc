@@ -146,7 +146,7 @@ TEST_F(ExternalScenario, AWorkerStartsNothingUnlessItMay) {
   config.problem.log.trials = {forward(1, 1)};
   allow_external_programs(false);
   const v1::TaskResult refused = predicted(config.problem);
-  EXPECT_EQ(refused.outcome(), v1::INVALID_REQUEST);
+  EXPECT_EQ(refused.outcome(), v1::WORKER_UNFIT);
   EXPECT_THAT(refused.message(), HasSubstr("--allow-external"));
 }
 

@@ -250,6 +250,28 @@ TEST_F(ObjectiveWorker, HasNothingToPredict) {
   EXPECT_THAT(result.message(), HasSubstr("scenario objective"));
 }
 
+// Of a machine that lacks the program, or has another: no values were asked for.
+TEST_F(ObjectiveWorker, IsUnfitWithoutTheProgram) {
+  auto config = parse_config(config_text("exit 3"), "objective.toml", start_program);
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  v1::Problem message = to_proto(config->problem);
+  const auto outcome = [&] {
+    const auto prepared = prepare(message);
+    EXPECT_TRUE(prepared.ok()) << prepared.error().message;
+    v1::Task task;
+    task.mutable_evaluate();
+    return evaluate(prepared->get(), task).outcome();
+  };
+  EXPECT_EQ(outcome(), v1::WORKER_FAILED);
+  auto* argv = message.mutable_external()->mutable_argv();
+  for (const std::string other : {"exit 2", "read x; echo '{\"gapfarm\":1}'; read x"}) {
+    *argv->Mutable(argv->size() - 1) = other;
+    EXPECT_EQ(outcome(), v1::WORKER_UNFIT) << other;
+  }
+  *argv->Mutable(0) = "no-such-program";
+  EXPECT_EQ(outcome(), v1::WORKER_UNFIT);
+}
+
 TEST_F(ObjectiveWorker, ProblemAndModelKeepWhatItIs) {
   const auto config = config_of("direction = \"maximise\"\nnoisy = true\n");
   const v1::Problem message = to_proto(config->problem);

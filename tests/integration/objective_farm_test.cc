@@ -1,0 +1,71 @@
+// Runs of a user's program on machines that cannot, or may not, start it.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/program_runs.h"
+
+namespace gapfarm::objective_farm_test {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class ObjectiveFarm : public ProgramRuns {
+ protected:
+  // `misbehave` is Python that may change `answer`.
+  std::string config(const std::string& misbehave = "", const std::string& more = "") const {
+    folder_.write(
+        "bowl.py",
+        "import json, os, sys\n"
+        "for line in sys.stdin:\n"
+        "    task = json.loads(line)\n"
+        "    if 'id' not in task:\n"
+        "        print(json.dumps({'gapfarm': 1, 'parameters': [\n"
+        "            {'key': 'x', 'lower': -9, 'upper': 9, 'nominal': 3}]}), flush=True)\n"
+        "        continue\n"
+        "    answer = {'id': task['id'], 'value': task['parameters']['x'] ** 2}\n" +
+            misbehave + "    print(json.dumps(answer), flush=True)\n");
+    return folder_.write("run.toml",
+                         "scenario = \"objective\"\n[objective]\n"
+                         "program = [\"python3\", \"bowl.py\"]\n" +
+                             more + "[evolution]\npopulation = 8\n");
+  }
+};
+
+TEST_F(ObjectiveFarm, WhoCannotOrMayNotStartTheProgramIsTurnedAwayAndTheRunGoesOn) {
+  const std::string file = config();
+  ASSERT_EQ(evolve(file, "calm", "4").exit_code, 0);
+  RunningProgram master(
+      "gapfarm", {"evolve", file, "--out", folder_ / "run", "--generations", "4", "--workers", "0",
+                  "--listen", "tcp://127.0.0.1:*", "--insecure"});
+  std::string endpoint;
+  ASSERT_TRUE(wait_until([&] {
+    const std::string err = master.err();
+    const std::size_t at = err.find("tcp://127.0.0.1:");
+    if (at != err.npos) endpoint = err.substr(at, err.find_first_of(" \n,", at) - at);
+    return at != err.npos;
+  })) << master.err();
+  const auto worker = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"--connect", endpoint, "--insecure"});
+    return more;
+  };
+  const std::string option = "start it with --allow-external";
+  const Finished forgotten = run_program("gapfarm-worker", worker({"--processes", "1"}));
+  EXPECT_EQ(forgotten.exit_code, 78);
+  EXPECT_THAT(forgotten.err, HasSubstr(option));
+  // More processes than a task may end.
+  const Finished lacking = run_program(
+      "gapfarm-worker", worker({"--allow-external", "--processes", "4"}), {"PATH=/nowhere"});
+  EXPECT_EQ(lacking.exit_code, 78);
+  EXPECT_THAT(lacking.err, HasSubstr("cannot be started"));
+  EXPECT_THAT(master.err(), AllOf(HasSubstr(option), HasSubstr("cannot be started"),
+                                  HasSubstr("no worker that can is left")));
+  EXPECT_FALSE(master.ended());
+  RunningProgram able("gapfarm-worker", worker({"--allow-external", "--processes", "1"}));
+  EXPECT_EQ(master.wait().exit_code, 0);
+  EXPECT_EQ(status("run")["quarantined"], 0);
+  EXPECT_EQ(status("run")["digest"], status("calm")["digest"]);
+}
+
+}  // namespace gapfarm::objective_farm_test
