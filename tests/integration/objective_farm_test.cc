@@ -68,4 +68,12 @@ TEST_F(ObjectiveFarm, WhoCannotOrMayNotStartTheProgramIsTurnedAwayAndTheRunGoesO
   EXPECT_EQ(status("run")["digest"], status("calm")["digest"]);
 }
 
+TEST_F(ObjectiveFarm, LaunchedWorkersMayStartProgramsWhereTheLaunchAllowsIt) {
+  const Finished finished = gapfarm_command(
+      {"evolve", config(), "--out", folder_ / "run", "--generations", "2", "--workers", "0",
+       "--insecure", "--workers-on", "local", "--max", "1", "--look-every", "0.1",
+       "--allow-external", "--worker-logs", folder_ / "logs"});
+  EXPECT_EQ(finished.exit_code, 0) << finished.err;
+}
+
 }  // namespace gapfarm::objective_farm_test

@@ -51,6 +51,7 @@ std::vector<std::string> worker_command(const FleetChoice& choice, const Cluster
                                              : there                     ? site.keys
                                                                          : whole_path(keys)});
   }
+  if (choice.allow_external || site.allow_external) command.push_back("--allow-external");
   const auto seconds = [](double s) { return std::to_string(std::lround(s)); };
   command.insert(command.end(), {"--processes", std::to_string(choice.workers_per_job),
                                  "--wait-limit", seconds(wait_limit_s)});
@@ -97,6 +98,8 @@ void FleetChoice::declare(CLI::App& app, const std::string& with) {
       ->type_name("FILE");
   app.add_option("--worker-keys", worker_keys, "Key folder as the nodes find it")
       ->type_name("FOLDER");
+  app.add_flag("--allow-external", allow_external,
+               "Let them start the programs that the master names (docs/security.md)");
   app.add_option("--worker-logs", logs, "Folder of the jobs' output, which all nodes see")
       ->type_name("FOLDER");
   app.option_defaults()->group("Options");
@@ -118,6 +121,7 @@ std::vector<std::string> FleetChoice::arguments() const {
   add("--worker-program", worker);
   add("--worker-keys", worker_keys);
   add("--worker-logs", logs);
+  if (allow_external) all.push_back("--allow-external");
   if (block > 0) add("--block", std::to_string(block));
   for (const std::string& option : extra) all.push_back("--with=" + option);
   return all;

@@ -23,6 +23,7 @@ struct FleetChoice {
   std::string ssh_config;
   std::string worker;  // program on the nodes
   std::string worker_keys;
+  bool allow_external = false;
   std::string logs = "gapfarm-logs";
   unsigned block = 0;              // jobs in one submission; 0: the site's
   std::vector<std::string> extra;  // for the site's command

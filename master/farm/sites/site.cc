@@ -58,6 +58,7 @@ Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
   top.read("requeue", site.requeue);
   top.read("worker", site.worker);
   top.read("keys", site.keys);
+  top.read("allow_external", site.allow_external);
   top.read("interval", site.interval_s, 0.1, 3600, "s");
   top.read("backoff", site.backoff_s, 0.1, 3600, "s");
   top.finish();

@@ -44,9 +44,10 @@ struct ClusterSite {
   std::vector<std::string> master;
   std::string requeue;  // what its script runs to be queued again
 
-  std::string worker, keys;  // defaults on the nodes; empty: as here
-  double interval_s = 15;    // between two looks
-  double backoff_s = 30;     // FleetLimits::backoff_s
+  std::string worker, keys;     // defaults on the nodes; empty: as here
+  bool allow_external = false;  // workers may start what a master names
+  double interval_s = 15;       // between two looks
+  double backoff_s = 30;        // FleetLimits::backoff_s
 };
 
 // Errors name the file's lines.
