@@ -76,4 +76,32 @@ TEST_F(ObjectiveFarm, LaunchedWorkersMayStartProgramsWhereTheLaunchAllowsIt) {
   EXPECT_EQ(finished.exit_code, 0) << finished.err;
 }
 
+TEST_F(ObjectiveFarm, ALostProgramEndsTheRunAtItsLastGeneration) {
+  const Finished lost =
+      evolve(config("    if task['id'] == 20: os.rename('bowl.py', 'away.py'); os._exit(1)\n"),
+             "run", "50", "1");
+  EXPECT_EQ(lost.exit_code, 1) << lost.err;
+  EXPECT_THAT(lost.err, HasSubstr("no worker can be had"));
+  EXPECT_EQ(status("run")["quarantined"], 0);
+  const auto generation = status("run")["generation"];
+  EXPECT_GT(generation, 0);
+  // And nothing begins without it.
+  const Finished without = gapfarm_command({"resume", folder_ / "run", "--workers", "1"});
+  EXPECT_EQ(without.exit_code, 2) << without.err;
+  EXPECT_EQ(status("run")["generation"], generation);
+  config();
+  EXPECT_EQ(gapfarm_command({"resume", folder_ / "run", "--generations", "6"}).exit_code, 0);
+}
+
+TEST_F(ObjectiveFarm, ResumeRefusesAProgramThatDeclaresOtherThings) {
+  ASSERT_EQ(evolve(config(), "run", "1").exit_code, 0);
+  std::string other = text_of(folder_.path() / "bowl.py");
+  other.replace(other.find("'upper': 9"), 10, "'upper': 8");
+  folder_.write("bowl.py", other);
+  const Finished refused = gapfarm_command({"resume", folder_ / "run", "--generations", "2"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("declares other things than when the run began"));
+  EXPECT_EQ(status("run")["generation"], 1);
+}
+
 }  // namespace gapfarm::objective_farm_test

@@ -35,6 +35,26 @@ void note_changed_robot(const Config& config, Console& console) {
                "`gapfarm evolve` takes the file as it is");
 }
 
+// An error where the program of a user's that the run needs is not what it began with.
+Status check_program(const Config& config, const std::string& run) {
+  if (!config.problem.external) return {};
+  const ExternalProgram& program = *config.problem.external;
+  ASSIGN_OR_RETURN(const std::string introduction, start_program(program.command));
+  if (introduction == program.introduction) return {};
+  return Error{run + ": the program '" + program.command.argv[0] + "' in '" +
+               program.command.folder +
+               "' declares other things than when the run began; put it back as it was, or begin "
+               "another run by `gapfarm evolve`"};
+}
+
+// Of the run as it is, before anything is written; what cannot be read is for others to report.
+Status check_program(const ResumeCommand& command) {
+  const auto reader = RunReader::open(command.run);
+  if (!reader) return {};
+  const auto config = stored_config(reader->info(), command.options.overrides);
+  return config ? check_program(*config, command.run) : Status();
+}
+
 // An error where the run has no such generation to go on from.
 Status check_generation(const ResumeCommand& command) {
   if (!command.branch.generation) return {};
@@ -72,6 +92,7 @@ Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
   note_changed_robot(config, context.console);
   RETURN_IF_ERROR(branch_off(reader, command.branch, config));
   RETURN_IF_ERROR(check_runnable(config));
+  RETURN_IF_ERROR(check_program(config, command.run));
   RETURN_IF_ERROR(check_farm(command.options.farm, config.farm));
   RETURN_IF_ERROR(check_folder(command.out, FolderKind::kRun));
   const std::string does = "branch off " + search_start_text(run_info(config, overrides)) +
@@ -98,6 +119,7 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
                  " as it is; name its folder by --out"};
   }
   RETURN_IF_ERROR(check_generation(command));
+  RETURN_IF_ERROR(check_program(command));
   if (context.dry_run) return print_resume(command, context);
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
