@@ -51,9 +51,12 @@ void LineProgram::kill() {
   close_fd(&from_);
   rest_.clear();
   if (pid_ <= 0) return;
-  ::kill(pid_, SIGKILL);
+  // Not reaped before, so that the group's number is nobody else's.
+  ::kill(-pid_, SIGKILL);
   waitpid(pid_, nullptr, 0);
-  pid_ = 0;
+  if (guard_ > 0) waitpid(guard_, nullptr, 0);
+  close_fd(&guarded_);
+  pid_ = guard_ = 0;
 }
 
 Error LineProgram::failed(const std::string& what) {
@@ -61,24 +64,39 @@ Error LineProgram::failed(const std::string& what) {
   return Error{"external program '" + name() + "' " + what};
 }
 
+bool LineProgram::has_ended(siginfo_t* how) const {
+  how->si_pid = 0;
+  return waitid(P_PID, static_cast<id_t>(pid_), how, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         how->si_pid == pid_;
+}
+
 // How it ended, of one that closed its pipe.
 Error LineProgram::ended() {
   constexpr int kPatience_ms = 1000;  // between closing its pipe and being gone
-  int status = 0;
-  pid_t gone = 0;
-  for (int waited = 0; waited < kPatience_ms; ++waited) {
-    gone = waitpid(pid_, &status, WNOHANG);
-    if (gone != 0) break;
-    poll(nullptr, 0, 1);
-  }
-  if (gone != pid_) return failed("closed its output and goes on; it has to answer on stdout");
-  pid_ = 0;
-  if (WIFSIGNALED(status)) {
-    const int signal = WTERMSIG(status);
+  siginfo_t how{};
+  for (int waited = 0; waited < kPatience_ms && !has_ended(&how); ++waited) poll(nullptr, 0, 1);
+  if (!has_ended(&how)) return failed("closed its output and goes on; it has to answer on stdout");
+  if (how.si_code != CLD_EXITED) {
+    const int signal = how.si_status;
     return failed("crashed with signal " + std::to_string(signal) + " (" + strsignal(signal) + ")");
   }
-  return failed("ended with status " + std::to_string(WEXITSTATUS(status)) +
-                " instead of answering");
+  return failed("ended with status " + std::to_string(how.si_status) + " instead of answering");
+}
+
+// A shell in the program's group that waits for the end of a pipe: this process's end, however it
+// comes, closes it.
+void LineProgram::start_guard() {
+  int in[2];
+  if (pipe2(in, O_CLOEXEC) != 0) return;
+  ChildSetup setup;
+  setup.arguments = {"/bin/sh", "-c", "read line; kill -s KILL 0"};
+  setup.in = in[0];
+  setup.death_signal = 0;
+  setup.joins_group = pid_;
+  const Result<pid_t> guard = start_child(setup);
+  close(in[0]);
+  guarded_ = in[1];
+  if (guard) guard_ = *guard;
 }
 
 Status LineProgram::start() {
@@ -94,6 +112,7 @@ Status LineProgram::start() {
   setup.folder = folder_;
   setup.in = in[1];
   setup.out = out[1];
+  setup.leads_group = true;
   const Result<pid_t> pid = start_child(setup);
   close(in[1]);
   close(out[1]);
@@ -102,6 +121,7 @@ Status LineProgram::start() {
   answered_ = false;
   if (!pid) return failed("cannot be started in '" + folder_ + "': " + pid.error().message);
   pid_ = *pid;
+  start_guard();
   return {};
 }
 
@@ -144,6 +164,8 @@ Result<std::string> LineProgram::receive(double until, double limit_s) {
       return line;
     }
     if (!wait_for(from_, POLLIN, until)) {
+      siginfo_t how{};
+      if (has_ended(&how)) return ended();  // and what it started has its output
       return failed("did not answer within " + formatted("%g s", limit_s));
     }
     char bytes[65536];

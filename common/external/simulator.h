@@ -1,6 +1,7 @@
 // A simulator of the user's, asked for one motion at a time.
 #pragma once
 
+#include <signal.h>
 #include <sys/types.h>
 
 #include <cstddef>
@@ -22,7 +23,7 @@ struct LineLimits {
 };
 
 // Started with the first ask() and again after one that failed; dies with the thread that started
-// it.  Its stderr is this process's.  One thread at a time.
+// it.  What it starts dies with it.  Its stderr is this process's.  One thread at a time.
 class LineProgram {
  public:
   // `words`: program and arguments, found by PATH, started in `folder`.
@@ -42,11 +43,13 @@ class LineProgram {
   std::string name() const;  // its words, as typed
   // What asks it these lines in a shell.
   std::string by_hand(const std::vector<std::string>& lines) const;
-  // Ends it with SIGKILL.
+  // Ends it and what it started with SIGKILL.
   void kill();
 
  private:
   Status start();
+  void start_guard();
+  bool has_ended(siginfo_t* how) const;
   Status send(const std::string& line, double until);
   Result<std::string> receive(double until, double limit_s);
   Error ended();
@@ -58,7 +61,9 @@ class LineProgram {
   LineLimits limits_;
   Clock clock_;
   std::function<void()> waiting_;
-  pid_t pid_ = 0;
+  pid_t pid_ = 0;    // and of its process group
+  pid_t guard_ = 0;  // ends the group when this process is gone; 0: none
+  int guarded_ = -1;
   int to_ = -1;
   int from_ = -1;
   bool answered_ = false;

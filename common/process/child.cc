@@ -36,7 +36,7 @@ void pass(int fd, int null, int as) { dup2(fd < 0 ? null : fd, as); }
     // The parent may have died before the line above.
     if (getppid() != prepared.parent) _exit(0);
   }
-  if (setup.leads_group) setpgid(0, 0);
+  if (setup.leads_group || setup.joins_group != 0) setpgid(0, setup.joins_group);
   const int reported = fcntl(prepared.reported, F_DUPFD_CLOEXEC, kKept + 1);
   pass(setup.in, prepared.null, STDIN_FILENO);
   pass(setup.out, prepared.null, STDOUT_FILENO);

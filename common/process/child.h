@@ -23,6 +23,7 @@ struct ChildSetup {
   int kept = -1;                  // becomes descriptor 3 (ProgressPage::kInheritedFd); -1: none
   int death_signal = SIGKILL;     // sent when the thread that starts it ends; 0: none
   bool leads_group = false;       // a terminal's Ctrl-C does not reach it
+  pid_t joins_group = 0;          // the group's leader; 0: none
   bool blocks_interrupt = false;  // until its own handlers stand (StopOnSignals unblocks SIGINT)
   int niceness = 0;
 };

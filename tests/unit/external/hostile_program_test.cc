@@ -1,6 +1,9 @@
 // Programs of users that fail in every way that they have.  Real processes; time is passed in.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "common/base/clock.h"
 #include "common/external/simulator.h"
@@ -86,6 +89,56 @@ TEST(LineProgram, EndsWithItsOwner) {
     EXPECT_EQ(::kill(pid, 0), 0);
   }
   EXPECT_NE(::kill(pid, 0), 0);
+}
+
+// Readable at its end: all that had it as their output are gone.
+std::string rest_of(int fd) {
+  std::string text;
+  char bytes[256];
+  for (ssize_t n = 0; (n = read(fd, bytes, sizeof bytes)) > 0;) {
+    text.append(bytes, static_cast<std::size_t>(n));
+  }
+  return text;
+}
+
+// A wrapper that starts the program proper, which holds descriptor 9 as long as it lives.
+std::string wrapping(int fd) {
+  return "exec 9>/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(fd) +
+         "; (while :; do sleep 1000; done) & read x; echo answer; read x";
+}
+
+TEST(LineProgram, TakesWhatItStartedWithIt) {
+  int ends[2];
+  ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
+  {
+    LineProgram program(shell(wrapping(ends[1])), "", {}, monotonic_seconds);
+    EXPECT_EQ(program.ask("x").value(), "answer");
+    close(ends[1]);
+  }
+  EXPECT_EQ(rest_of(ends[0]), "");
+  close(ends[0]);
+}
+
+TEST(LineProgram, TakesWhatItStartedWithItWhenItsOwnerIsKilled) {
+  int ends[2];
+  ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
+  const pid_t owner = fork();
+  if (owner == 0) {
+    LineProgram program(shell(wrapping(ends[1])), "", {}, monotonic_seconds);
+    if (program.ask("x").ok()) ::kill(getpid(), SIGKILL);
+    _exit(1);
+  }
+  close(ends[1]);
+  int status = 0;
+  ASSERT_EQ(waitpid(owner, &status, 0), owner);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(rest_of(ends[0]), "");
+  close(ends[0]);
+}
+
+TEST(LineProgram, NamesHowOneEndedWhoseChildHasItsOutput) {
+  LineProgram program(shell("sleep 1000 & exit 3"), "", {0.2, 0.2}, monotonic_seconds);
+  EXPECT_THAT(program.ask("x").error().message, HasSubstr("ended with status 3"));
 }
 
 // A program that introduces itself well and then answers with `answer`.
