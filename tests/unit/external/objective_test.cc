@@ -1,4 +1,6 @@
 // Scenario `objective`: what a program declares, is asked and answers, and what becomes of it.
+#include "scripts/bridges/objective.h"
+
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
@@ -75,6 +77,20 @@ TEST(Objective, RefusesWhatCannotBeSearched) {
   EXPECT_THAT(refusal(how + bend + R"("bent"})"), HasSubstr("no object"));
   EXPECT_THAT(refusal(R"({"key":"x","lower":0,"upper":1,"nominal":0},)" + bend + R"({"x":1}})"),
               HasSubstr("neither choices nor an integer"));
+}
+
+TEST(Objective, AskedInCppParametersMayBeNamedAsTheQuestionsOwnKeys) {
+  const Question hello(hello_line());
+  EXPECT_FALSE(hello.asks());
+  const Question question(
+      R"({"id":7,"parameters":{"id":3,"seed":-2.5,"how":"bent"},"seed":4294967295})");
+  EXPECT_TRUE(question.asks());
+  EXPECT_EQ(question.id(), 7u);
+  EXPECT_EQ(question.seed(), 4294967295u);
+  EXPECT_EQ(question.number("id"), 3);
+  EXPECT_EQ(question.number("seed"), -2.5);
+  EXPECT_EQ(question.choice("how"), "bent");
+  EXPECT_FALSE(question.has("parameters"));
 }
 
 Result<ExternalAnswer> answered(const std::string& rest) {
@@ -225,6 +241,28 @@ TEST_F(ObjectiveWorker, AnswersWithTheValueAsItCame) {
   EXPECT_EQ(evaluated("echo rubbish").outcome(), v1::WORKER_FAILED);
 }
 
+// Of a machine that lacks the program, or has another: no values were asked for.
+TEST_F(ObjectiveWorker, IsUnfitWithoutTheProgram) {
+  auto config = parse_config(config_text("exit 3"), "objective.toml", start_program);
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  v1::Problem message = to_proto(config->problem);
+  const auto outcome = [&] {
+    const auto prepared = prepare(message);
+    EXPECT_TRUE(prepared.ok()) << prepared.error().message;
+    v1::Task task;
+    task.mutable_evaluate();
+    return evaluate(prepared->get(), task).outcome();
+  };
+  EXPECT_EQ(outcome(), v1::WORKER_FAILED);
+  auto* argv = message.mutable_external()->mutable_argv();
+  for (const std::string other : {"exit 2", "read x; echo '{\"gapfarm\":1}'; read x"}) {
+    *argv->Mutable(argv->size() - 1) = other;
+    EXPECT_EQ(outcome(), v1::WORKER_UNFIT) << other;
+  }
+  *argv->Mutable(0) = "no-such-program";
+  EXPECT_EQ(outcome(), v1::WORKER_UNFIT);
+}
+
 TEST_F(ObjectiveWorker, AnswersWithSeveralValuesInTheConfigsOrder) {
   const std::string more = std::string(kSeveral) + kNsga2;
   const v1::TaskResult result =
@@ -248,28 +286,6 @@ TEST_F(ObjectiveWorker, HasNothingToPredict) {
   const v1::TaskResult result = evaluate(prepared->get(), task);
   EXPECT_EQ(result.outcome(), v1::INVALID_REQUEST);
   EXPECT_THAT(result.message(), HasSubstr("scenario objective"));
-}
-
-// Of a machine that lacks the program, or has another: no values were asked for.
-TEST_F(ObjectiveWorker, IsUnfitWithoutTheProgram) {
-  auto config = parse_config(config_text("exit 3"), "objective.toml", start_program);
-  ASSERT_TRUE(config.ok()) << config.error().message;
-  v1::Problem message = to_proto(config->problem);
-  const auto outcome = [&] {
-    const auto prepared = prepare(message);
-    EXPECT_TRUE(prepared.ok()) << prepared.error().message;
-    v1::Task task;
-    task.mutable_evaluate();
-    return evaluate(prepared->get(), task).outcome();
-  };
-  EXPECT_EQ(outcome(), v1::WORKER_FAILED);
-  auto* argv = message.mutable_external()->mutable_argv();
-  for (const std::string other : {"exit 2", "read x; echo '{\"gapfarm\":1}'; read x"}) {
-    *argv->Mutable(argv->size() - 1) = other;
-    EXPECT_EQ(outcome(), v1::WORKER_UNFIT) << other;
-  }
-  *argv->Mutable(0) = "no-such-program";
-  EXPECT_EQ(outcome(), v1::WORKER_UNFIT);
 }
 
 TEST_F(ObjectiveWorker, ProblemAndModelKeepWhatItIs) {
