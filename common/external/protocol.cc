@@ -54,6 +54,13 @@ Status check_keys(const Json& json, const std::string& parameter) {
   return {};
 }
 
+Result<bool> flag_of(const Json& json, const char* key) {
+  const Json given = json.value(key, Json(false));
+  if (given.is_boolean()) return given.get<bool>();
+  return Error{"declares parameter '" + word_of(json, "key") + "' with \"" + key +
+               "\": " + json_text(given) + "; it takes true or false"};
+}
+
 // The index of a word, or NaN.
 double choice_of(const Parameter& p, const Json& word) {
   const auto at = std::find(p.choices.begin(), p.choices.end(), word);
@@ -111,7 +118,9 @@ Result<Parameter> read_parameter(const Json& json) {
   Parameter p;
   p.key = word_of(json, "key");
   RETURN_IF_ERROR(check_keys(json, p.key));
-  if (json.value("integer", Json(false)) == Json(true)) p.kind = ParameterKind::kInteger;
+  ASSIGN_OR_RETURN(const bool whole, flag_of(json, "integer"));
+  ASSIGN_OR_RETURN(const bool log, flag_of(json, "log"));
+  if (whole) p.kind = ParameterKind::kInteger;
   p.unit = word_of(json, "unit");
   if (p.unit.empty()) p.unit = "-";
   p.summary = word_of(json, "summary");
@@ -122,7 +131,7 @@ Result<Parameter> read_parameter(const Json& json) {
   p.lower = number_of(json, "lower", NAN);
   p.upper = number_of(json, "upper", NAN);
   p.nominal = number_of(json, "nominal", NAN);
-  if (json.value("log", Json(false)) == Json(true)) p.scale = ParameterScale::kLog;
+  if (log) p.scale = ParameterScale::kLog;
   return p;
 }
 

@@ -79,6 +79,15 @@ TEST(Objective, RefusesWhatCannotBeSearched) {
               HasSubstr("neither choices nor an integer"));
 }
 
+TEST(Objective, RefusesFlagsThatAreNeitherTrueNorFalse) {
+  for (const std::string given : {"1", "\"true\"", "null"}) {
+    const std::string x = R"({"key":"x","lower":1,"upper":9,"nominal":2,)";
+    EXPECT_THAT(refusal(x + "\"integer\":" + given + "}"),
+                HasSubstr("'x' with \"integer\": " + given + "; it takes true or false"));
+    EXPECT_THAT(refusal(x + "\"log\":" + given + "}"), HasSubstr("it takes true or false"));
+  }
+}
+
 TEST(Objective, AskedInCppParametersMayBeNamedAsTheQuestionsOwnKeys) {
   const Question hello(hello_line());
   EXPECT_FALSE(hello.asks());
