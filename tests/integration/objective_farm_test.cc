@@ -104,4 +104,10 @@ TEST_F(ObjectiveFarm, ResumeRefusesAProgramThatDeclaresOtherThings) {
   EXPECT_EQ(status("run")["generation"], 1);
 }
 
+TEST_F(ObjectiveFarm, ARunOfCrashesAloneHasFailed) {
+  const Finished crashed = evolve(config("    os._exit(9)\n"), "run", "1");
+  EXPECT_EQ(crashed.exit_code, 1) << crashed.err;
+  EXPECT_THAT(crashed.err, HasSubstr("there is no model"));
+}
+
 }  // namespace gapfarm::objective_farm_test

@@ -193,14 +193,14 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
     context.console.note("continue with: gapfarm resume " + shell_quoted(run));
     return kExitResumable;
   }
-  if (summary->given_up == 0) {
-    const auto& best = summary->evolved.best;
-    if (!best || best->standing.outcome == v1::OK) return kExitDone;
+  const auto& best = summary->evolved.best;
+  if (best && best->standing.outcome != v1::OK) {
     const std::string why = summary->failure.empty() ? "" : ": " + summary->failure;
     context.console.note("there is no model" + why + "; what happened: gapfarm status " +
                          shell_quoted(run));
     return kExitFailed;
   }
+  if (summary->given_up == 0) return kExitDone;
   context.console.note(fmt::format(
       "{} given up; which and why: gapfarm status {}",
       summary->given_up == 1 ? "1 task was" : std::to_string(summary->given_up) + " tasks were",
