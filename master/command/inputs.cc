@@ -259,8 +259,6 @@ void show_warnings(const Problem& problem, Console& console) {
   }
 }
 
-namespace {
-
 Result<Model> find_model(const std::string& run_or_model, Console& console) {
   namespace fs = std::filesystem;
   const fs::path path(run_or_model);
@@ -296,8 +294,6 @@ Result<Model> find_model(const std::string& run_or_model, Console& console) {
       std::to_string(model->origin.generation));
   return model;
 }
-
-}  // namespace
 
 Status check_same_robot(const Model& model, const std::string& path, const Config& config,
                         const std::string& config_path) {

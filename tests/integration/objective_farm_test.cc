@@ -110,4 +110,17 @@ TEST_F(ObjectiveFarm, ARunOfCrashesAloneHasFailed) {
   EXPECT_THAT(crashed.err, HasSubstr("there is no model"));
 }
 
+TEST_F(ObjectiveFarm, BeginsAtARunOrAModel) {
+  const std::string file = config();
+  ASSERT_EQ(evolve(file, "run", "8").exit_code, 0);
+  for (const std::string from : {"run", "run/model.toml"}) {
+    const Finished finished = gapfarm_command({"evolve", file, "--from", folder_ / from, "--out",
+                                               folder_ / ("from" + std::to_string(from.size())),
+                                               "--generations", "1", "--workers", "1"});
+    ASSERT_EQ(finished.exit_code, 0) << finished.err;
+    EXPECT_LE(status("from" + std::to_string(from.size()))["best_fitness"],
+              status("run")["best_fitness"]);
+  }
+}
+
 }  // namespace gapfarm::objective_farm_test

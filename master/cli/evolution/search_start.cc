@@ -270,7 +270,7 @@ Status begin_at(const std::string& from, Config& config, const std::string& conf
   const bool table = std::filesystem::is_regular_file(path, ignored) &&
                      path.extension() != ".toml" && path.extension() != ".sqlite";
   if (!table) {
-    ASSIGN_OR_RETURN(const Model model, read_model_of(from, console));
+    ASSIGN_OR_RETURN(const Model model, find_model(from, console));
     RETURN_IF_ERROR(check_same_robot(model, from, config, config_path));
     ASSIGN_OR_RETURN(auto genome, genome_of_model(model, from, config));
     start.genomes = {std::move(genome)};
