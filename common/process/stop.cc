@@ -2,6 +2,7 @@
 
 #include <signal.h>
 #include <sys/eventfd.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cassert>
@@ -10,6 +11,16 @@
 
 namespace gapfarm {
 namespace {
+
+// Who stops a process signals it and at once its group, as coreutils' timeout and batch systems do.
+// No person who means a second request is as quick.
+constexpr std::int64_t kOneRequest_ns = 500'000'000;
+
+std::int64_t monotonic_ns() {  // async-signal-safe
+  timespec now = {};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
+}
 
 // A handler takes no argument, so the one instance that signals go to has to be global.
 std::atomic<StopSource*> signal_target{nullptr};
@@ -22,16 +33,25 @@ void handle(int signal) {
 
 }  // namespace
 
-StopSource::StopSource() : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) { assert(fd_ >= 0); }
+StopSource::StopSource()
+    : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), terminated_ns_(-kOneRequest_ns) {
+  assert(fd_ >= 0);
+}
 
 StopSource::~StopSource() { close(fd_); }
 
-void StopSource::request(int signal) {
+bool StopSource::request(int signal) {
+  if (signal == SIGTERM) {
+    const std::int64_t now_ns = monotonic_ns();
+    if (now_ns - terminated_ns_.load() < kOneRequest_ns) return false;
+    terminated_ns_.store(now_ns);
+  }
   signal_.store(signal);
   requests_.fetch_add(1);
   const std::uint64_t one = 1;
   // A full counter is readable already, so nothing is lost when the write fails.
   [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+  return true;
 }
 
 void StopSource::acknowledge() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
 
 namespace gapfarm {
@@ -13,7 +14,8 @@ class StopSource {
   StopSource& operator=(StopSource&&) = delete;
 
   // Async-signal-safe and thread-safe.  `signal` is kept for the exit status; 0: no signal.
-  void request(int signal = 0);
+  // False: a SIGTERM right after another, which is one request.
+  bool request(int signal = 0);
   bool requested() const { return requests() > 0; }
   // How often: a second request usually means "at once".
   unsigned requests() const { return requests_.load(); }
@@ -28,6 +30,7 @@ class StopSource {
   int fd_;
   std::atomic<unsigned> requests_{0};
   std::atomic<int> signal_{0};
+  std::atomic<std::int64_t> terminated_ns_;  // the last SIGTERM that counted
 };
 
 // While it lives, SIGINT and SIGTERM go to `stop`; afterwards the old handlers are back.  With

@@ -28,8 +28,8 @@ std::atomic<StopSource*> target{nullptr};
 void handle(int signal) {
   const int saved_errno = errno;
   StopSource* stop = target.load();
-  if (!stop || stop->requested()) _exit(128 + signal);
-  stop->request(signal);
+  const bool again = stop == nullptr || stop->requested();
+  if (stop == nullptr || (stop->request(signal) && again)) _exit(128 + signal);
   errno = saved_errno;
 }
 

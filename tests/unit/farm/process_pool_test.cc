@@ -100,6 +100,17 @@ TEST(PrivateFolder, IsPrivateFitsASocketAndGoes) {
   EXPECT_NE(stat(path.c_str(), &status), 0);
 }
 
+// As of coreutils' timeout, which signals its child and then the group.
+TEST(Stop, ASecondSigtermAtOnceIsTheSameRequest) {
+  StopSource stop;
+  const StopOnSignals signals(&stop);
+  raise(SIGTERM);
+  raise(SIGTERM);
+  EXPECT_EQ(stop.requests(), 1u);
+  raise(SIGINT);
+  EXPECT_EQ(stop.requests(), 2u);
+}
+
 TEST(Stop, ASignalMakesTheDescriptorReadable) {
   StopSource stop;
   const StopOnSignals signals(&stop);
