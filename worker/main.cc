@@ -11,6 +11,7 @@
 #include "common/base/clock.h"
 #include "common/external/simulator.h"
 #include "common/net/keys.h"
+#include "common/net/socket.h"
 #include "common/process/process_pool.h"
 #include "common/usage/usage.h"
 #include "worker/evaluate.h"
@@ -157,6 +158,9 @@ int work(const Arguments& arguments) {
 }
 
 int start_workers(const Arguments& arguments) {
+  if (const Status s = check_endpoint(arguments.endpoint); !s) {
+    return complain(s.error(), kExitUsage);
+  }
   if (const auto security = link_security(arguments); !security) {
     return complain(security.error(), kExitUsage);
   }

@@ -148,21 +148,6 @@ void configure(zmq::socket_t& socket, const SocketOptions& options) {
   socket.set(zmq::sockopt::ipv6, false);
 }
 
-Status check_endpoint(const std::string& endpoint) {
-  if (endpoint.rfind("tcp://", 0) == 0) {
-    if (endpoint.find(':', 6) != std::string::npos) return {};
-    return Error{"endpoint '" + endpoint + "' has no port; write tcp://HOST:PORT"};
-  }
-  if (endpoint.rfind("ipc://", 0) == 0) {
-    const std::size_t limit = sizeof(sockaddr_un{}.sun_path) - 1;
-    const std::size_t size = endpoint.size() - 6;
-    if (size > 0 && size <= limit) return {};
-    return Error{"endpoint '" + endpoint + "' has a path of " + std::to_string(size) +
-                 " bytes; a socket's may have 1 to " + std::to_string(limit)};
-  }
-  return Error{"endpoint '" + endpoint + "' is neither tcp://HOST:PORT nor ipc://PATH"};
-}
-
 bool is_tcp(const std::string& endpoint) { return endpoint.rfind("tcp://", 0) == 0; }
 
 bool is_loopback(const std::string& endpoint) {
@@ -242,6 +227,26 @@ Error needs_keys(const std::string& endpoint) {
 }
 
 }  // namespace
+
+Status check_endpoint(const std::string& endpoint) {
+  if (endpoint.rfind("tcp://", 0) == 0) {
+    const std::size_t colon = endpoint.rfind(':');
+    const std::string port = colon > 6 ? endpoint.substr(colon + 1) : "";
+    if (port == "*") return {};
+    const bool number = !port.empty() && port.find_first_not_of("0123456789") == port.npos;
+    if (number && port.size() <= 5 && std::stoul(port) <= 65535) return {};
+    return Error{"endpoint '" + endpoint + "' has the port '" + port +
+                 "'; write tcp://HOST:PORT with a port from 1 to 65535"};
+  }
+  if (endpoint.rfind("ipc://", 0) == 0) {
+    const std::size_t limit = sizeof(sockaddr_un{}.sun_path) - 1;
+    const std::size_t size = endpoint.size() - 6;
+    if (size > 0 && size <= limit) return {};
+    return Error{"endpoint '" + endpoint + "' has a path of " + std::to_string(size) +
+                 " bytes; a socket's may have 1 to " + std::to_string(limit)};
+  }
+  return Error{"endpoint '" + endpoint + "' is neither tcp://HOST:PORT nor ipc://PATH"};
+}
 
 Status may_listen(const std::string& endpoint, const LinkSecurity& security) {
   RETURN_IF_ERROR(check_endpoint(endpoint));

@@ -42,6 +42,9 @@ struct SocketOptions {
   double linger_s = 1;  // how long closing may take to get the last messages out
 };
 
+// Whether it is tcp://HOST:PORT, PORT being * or a number, or ipc://PATH.
+Status check_endpoint(const std::string& endpoint);
+
 // What RouterSocket::bind() would say of `endpoint` before it tries.  Errors: not an endpoint;
 // tcp:// without keys, or open to more than this machine when `security` does not say so.
 Status may_listen(const std::string& endpoint, const LinkSecurity& security);

@@ -123,4 +123,17 @@ TEST_F(ObjectiveFarm, BeginsAtARunOrAModel) {
   }
 }
 
+TEST_F(ObjectiveFarm, APortIsANumberBelow65536) {
+  for (const std::string port : {"99999", "x", "", "5555x"}) {
+    const Finished master =
+        gapfarm_command({"evolve", config(), "--out", folder_ / "run", "--workers", "0",
+                         "--insecure", "--listen", "tcp://127.0.0.1:" + port});
+    EXPECT_EQ(master.exit_code, 2) << port;
+    EXPECT_THAT(master.err, HasSubstr("has the port '" + port + "'"));
+    const Finished worker =
+        run_program("gapfarm-worker", {"--insecure", "--connect", "tcp://127.0.0.1:" + port});
+    EXPECT_EQ(worker.exit_code, 2) << port;
+  }
+}
+
 }  // namespace gapfarm::objective_farm_test
