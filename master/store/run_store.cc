@@ -310,11 +310,11 @@ Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
   RETURN_IF_ERROR(sync_to_disk(backup));
   RETURN_IF_ERROR(sync_to_disk(run_));
 
-  // The individuals go with their generations.
+  // The individuals go with their generations.  What the run left in its folder is there as before.
   ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database_));
   RETURN_IF_ERROR(
       database_.exec("DELETE FROM generations WHERE generation > " + std::to_string(generation) +
-                         "; DELETE FROM documents WHERE generation > " +
+                         "; DELETE FROM documents WHERE name <> 'model' AND generation > " +
                          std::to_string(generation) + "; " + forget_incidents(generation + 1),
                      "forget the generations after " + std::to_string(generation)));
   RETURN_IF_ERROR(transaction.commit());

@@ -123,6 +123,13 @@ TEST_F(ObjectiveFarm, BeginsAtARunOrAModel) {
   }
 }
 
+TEST_F(ObjectiveFarm, WhatWasLeftBeforeAnEarlierGenerationIsReplacedInSilence) {
+  ASSERT_EQ(evolve(config(), "run", "4").exit_code, 0);
+  const Finished resumed = gapfarm_command({"resume", folder_ / "run", "--generation", "2"});
+  EXPECT_EQ(resumed.exit_code, 0);
+  EXPECT_THAT(resumed.err, testing::Not(HasSubstr("is not as this run left it")));
+}
+
 TEST_F(ObjectiveFarm, APortIsANumberBelow65536) {
   for (const std::string port : {"99999", "x", "", "5555x"}) {
     const Finished master =
