@@ -205,8 +205,27 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
   return std::optional<Problem>(std::move(apart));
 }
 
+// The search begins at the config's values; where something moves, kinematics give others.
+Status check_values_in_range(const Config& config) {
+  const Problem& problem = config.problem;
+  if (!is_value(problem.fitness.kind) || !config.evolution.seed_nominal) return {};
+  for (const Gene& gene : problem.genes) {
+    const double value = problem.values[gene.row];
+    if (value >= gene.lower && value <= gene.upper) continue;
+    const auto text = [&](double v) { return problem.table().format(gene.row, v); };
+    return Error{
+        fmt::format("{}: {} is {}, outside of its range in [genes], {} to {}; widen the "
+                    "range, give a value within it in [parameters], or set seed_nominal = "
+                    "false in [evolution]",
+                    config.path, problem.table()[gene.row].key, text(value), text(gene.lower),
+                    text(gene.upper))};
+  }
+  return {};
+}
+
 Status check_runnable(const Config& config) {
   RETURN_IF_ERROR(check_evolvable(config));
+  RETURN_IF_ERROR(check_values_in_range(config));
   OptimiserSetup setup;
   setup.settings = config.evolution;
   setup.genes = config.problem.genes;

@@ -123,6 +123,14 @@ TEST_F(ObjectiveFarm, BeginsAtARunOrAModel) {
   }
 }
 
+TEST_F(ObjectiveFarm, RefusesToBeginOutsideOfTheRanges) {
+  const std::string file = config("", "[genes]\nx = [-1, 1]\n");
+  for (const Finished& refused : {evolve(file, "run", "1"), gapfarm_command({"check", file})}) {
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("x is 3, outside of its range in [genes], -1 to 1"));
+  }
+}
+
 TEST_F(ObjectiveFarm, WhatWasLeftBeforeAnEarlierGenerationIsReplacedInSilence) {
   ASSERT_EQ(evolve(config(), "run", "4").exit_code, 0);
   const Finished resumed = gapfarm_command({"resume", folder_ / "run", "--generation", "2"});
