@@ -16,6 +16,11 @@ constexpr std::size_t kOffersKept = 10000;
 constexpr std::size_t kReasonsKept = 100;
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
+constexpr const char* kImpure =
+    "a program that draws numbers without its seed or keeps its past is not pure "
+    "(docs/objective.md)"
+    ", else this machine computes wrongly";
+
 EndCause cause_of(v1::ProcessEnd end) {
   switch (end) {
     case v1::PROCESS_KILLED:
@@ -290,8 +295,10 @@ void Scheduler::on_committed(const Committed& committed) {
   const Disagreement& d = *committed.disagreement;
   report(FarmEvent::kDisagreement, d.second->name,
          d.question + " has two answers: " + d.first->name + " on " + d.first->host +
-             " gave one answer and " + d.second->name + " on " + d.second->host +
-             " another; one of these machines computes wrongly, take it off the farm");
+             " gave one answer and " + d.second->name + " on " + d.second->host + " another; " +
+             (d.first->host == d.second->host
+                  ? kImpure
+                  : "one of these machines computes wrongly, take it off the farm"));
 }
 
 void Scheduler::on_dropped(WorkerRecord& worker, const v1::ResultBatch& batch) {
