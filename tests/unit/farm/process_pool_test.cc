@@ -1,9 +1,14 @@
 #include "common/process/process_pool.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -11,6 +16,7 @@
 #include "common/base/clock.h"
 #include "common/process/stop.h"
 #include "master/farm/local_workers.h"
+#include "tests/temporary_folder.h"
 
 namespace gapfarm::process_pool_test {
 
@@ -98,6 +104,35 @@ TEST(PrivateFolder, IsPrivateFitsASocketAndGoes) {
   EXPECT_EQ(status.st_mode & 0777, 0700u);
   folder.value().reset();
   EXPECT_NE(stat(path.c_str(), &status), 0);
+}
+
+TEST(PrivateFolder, TakesThoseOfMastersThatWereKilledAlong) {
+  const TemporaryFolder base;
+  setenv("TMPDIR", base.path().c_str(), 1);
+  const auto with_socket = [&](const char* name, bool listens, time_t age_s) {
+    const std::string folder = base / name, path = folder + "/farm";
+    mkdir(folder.c_str(), 0700);
+    sockaddr_un address = {};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, path.size());
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    if (listens) listen(fd, 1);
+    const timespec when = {time(nullptr) - age_s, 0}, times[] = {when, when};
+    utimensat(AT_FDCWD, path.c_str(), times, 0);
+    return fd;
+  };
+  close(with_socket("gapfarm-killed", false, 3600));
+  const int young = with_socket("gapfarm-begins", false, 0);
+  const int alive = with_socket("gapfarm-living", true, 3600);
+  const auto folder = PrivateFolder::make();
+  unsetenv("TMPDIR");
+  ASSERT_TRUE(folder.ok()) << folder.error().message;
+  EXPECT_NE(access((base / "gapfarm-killed").c_str(), F_OK), 0);
+  EXPECT_EQ(access((base / "gapfarm-begins/farm").c_str(), F_OK), 0);
+  EXPECT_EQ(access((base / "gapfarm-living/farm").c_str(), F_OK), 0);
+  close(young);
+  close(alive);
 }
 
 // As of coreutils' timeout, which signals its child and then the group.
