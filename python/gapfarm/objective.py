@@ -27,6 +27,7 @@ def answer(function: Function, parameters: Mapping[str, Any], seed: int) -> "dic
         if "values" in reply:
             reply["values"] = {str(name): float(value) for name, value in reply["values"].items()}
         reply["violations"] = [float(violation) for violation in reply.get("violations", [])]
+        json.dumps(reply)  # notes, or what the protocol does not know, may be no JSON
     except Exception as error:  # noqa: BLE001 - whatever a user's function raises
         traceback.print_exc()
         return {"outcome": "failed", "message": f"{type(error).__name__}: {error}"}

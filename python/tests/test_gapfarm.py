@@ -201,6 +201,7 @@ def test_what_an_objective_cannot_answer_is_a_failed_evaluation(capsys):
     assert answer(lambda *_: 1 / 0)["message"] == "ZeroDivisionError: division by zero"
     assert "Traceback" in capsys.readouterr().err
     assert answer(lambda *_: "rubbish")["outcome"] == "failed"
+    assert "set is not JSON" in answer(lambda *_: {"value": 1, "notes": {3}})["message"]
 
 
 def test_paths_come_with_a_simulated_log(run):
