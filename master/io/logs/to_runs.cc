@@ -156,8 +156,8 @@ class Importer {
       const std::string name = run_name(table, run, r, part);
       const bool leads_on = poses && (map.intervals || before.count(name) != 0);
       if (leads_on && map.increments && std::abs(values[3]) > std::numbers::pi) {
-        return Error{table.source + ": found a turn of " + format_double(values[3]) + " rad in row " +
-                     std::to_string(r + 1) +
+        return Error{table.source + ": found a turn of " + format_double(values[3]) +
+                     " rad in row " + std::to_string(r + 1) +
                      ", expected at most half a turn of an increment; of degrees say so in the "
                      "map: theta = { column = ..., unit = \"deg\" }"};
       }

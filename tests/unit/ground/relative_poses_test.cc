@@ -238,7 +238,11 @@ TEST(RelativePoses, AFileThatIsOffInEverythingIsCorrectedInEverything) {
 
 // Wheels and sensor were bent until some of it fitted.
 TEST(RelativePoses, AxesOfTheWorldAreFound) {
-  RunLog log = driven(2, 31);
+  Stream stream({38, Purpose::kTest, 0, 0, 0});
+  std::vector<WheelSpeeds> rows;
+  for (int k = 0; k < 120; ++k)
+    rows.push_back({2 + 3 * stream.uniform(), 4 + 4 * stream.uniform()});
+  RunLog log = log_of({scanned("1", rows, kSensor, {}, stream)});
   for (LoggedRun& run : log.runs) {
     Pose before, after;
     for (PoseRow& row : run.poses) {
