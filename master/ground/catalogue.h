@@ -21,6 +21,7 @@ class Catalogue {
   void wrong_poses();
   void wrong_increments();
   void sizes();
+  void all_sizes();
   void steering();
   void motors();
   void marker();

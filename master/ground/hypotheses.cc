@@ -51,7 +51,11 @@ void Catalogue::sizes() {
         {{"travel", 1, share, "ratio", "-"}});
   value("wheel_separation", {"icr_track", "friction_anisotropy"},
         "the distance between the sides, as they roll", {row("separation")});
-  // A file that was made with a ruler is off in all of them.
+}
+
+// A file that was made with a ruler is off in all of them; no robot changes so.
+void Catalogue::all_sizes() {
+  if (is_throttled(robot_) || is_holonomic(robot_) || is_steered(robot_)) return;
   KinematicRow left = row("left"), right = row("right"), apart = row("separation");
   left.key = "left", right.key = "right", apart.key = "separation";
   value("wheel_radius", {"wheel_separation", "motor_asymmetry"}, "the size of the robot",
@@ -198,6 +202,7 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
   catalogue.wrong_poses();
   catalogue.wrong_increments();
   catalogue.sizes();
+  catalogue.all_sizes();
   catalogue.steering();
   catalogue.motors();
   catalogue.marker();
