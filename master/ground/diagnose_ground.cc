@@ -8,6 +8,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
+#include "common/math/laws.h"
 #include "common/progress/stage_clock.h"
 #include "common/robot/robot_file.h"
 #include "master/ground/reference.h"
@@ -45,7 +46,7 @@ Result<GroundRobot> sense(const GroundRobot& robot, const GroundDiagnoseOptions&
       if (row.name != v.row.name) continue;
       row.nominal = v.value;
       row.tolerance =
-          std::max(row.tolerance, (v.interval.upper - v.interval.lower) / kNinetyDeviations);
+          std::max(row.tolerance, (v.interval.upper - v.interval.lower) / (2 * kNormal90));
     }
   }
   return sensed;

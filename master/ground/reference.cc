@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/base/try.h"
+#include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "common/score/floor_parts.h"
@@ -346,7 +347,7 @@ Status settle_sensor(const GroundRobot& robot, const WindowSettings& settings, s
     }
     const Eigen::MatrixX2d bounds = fitter.intervals(fit, seed);
     const std::vector<char> shown =
-        shown_rows(fit, (bounds.col(1) - bounds.col(0)) / kNinetyDeviations);
+        shown_rows(fit, (bounds.col(1) - bounds.col(0)) / (2 * kNormal90));
     for (std::size_t k = 0; k < fit.rows.size(); ++k) {
       const KinematicRow& row = question->rows[k];
       if (!row.name.starts_with("marker_")) continue;

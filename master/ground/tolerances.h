@@ -56,9 +56,6 @@ inline constexpr double kKeptGripShape = 0.05;      // of a logarithm; the refer
 // What lies within as many tolerances may be chance: 95 and 99 % of what is normal.
 inline constexpr double kMovedTolerances = 2, kFarTolerances = 2.58;
 
-// Of what is normal 90 % lie within so many standard deviations of another.
-inline constexpr double kNinetyDeviations = 3.29;
-
 // A robot of less than this share of its file's sizes and gains is another robot, and one of none
 // or of the opposite sign none at all.
 inline constexpr double kLeastRatio = 0.1;
