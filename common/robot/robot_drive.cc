@@ -42,6 +42,21 @@ const std::vector<double>& CommandTrack::mean(double t_s, double dt_s) {
   return mean_;
 }
 
+double CommandTrack::next_change(double t_s, double until_s) const {
+  std::size_t r = row_;
+  while (r + 1 < rows_.size() && rows_[r + 1].t_s <= t_s) ++r;
+  for (; r < rows_.size() && rows_[r].t_s < until_s; ++r) {
+    const bool last = r + 1 == rows_.size();
+    const double next = last ? std::numeric_limits<double>::infinity() : rows_[r + 1].t_s;
+    const double stops = timeout_s_ ? rows_[r].t_s + *timeout_s_ : next;
+    if (stops < next && stops > t_s) return std::min(stops, until_s);
+    if (!last && (stops < next || rows_[r + 1].values != rows_[r].values)) {
+      return std::min(next, until_s);
+    }
+  }
+  return until_s;
+}
+
 double CommandTrack::next_motion(double t_s) const {
   for (std::size_t r = row_; r < rows_.size(); ++r) {
     const bool over = r + 1 < rows_.size() && rows_[r + 1].t_s <= t_s;
@@ -185,23 +200,27 @@ double RobotDrive::follow(std::size_t i, double target, double dt_s) {
     limited_[i] = speeds_[i] = target;
     return target;
   }
-  double wanted = target;
+  double wanted = target, input = target;
   if (robot_.motors.acceleration_limit_m_s2) {
     const double most = *robot_.motors.acceleration_limit_m_s2 * dt_s;
     wanted = std::clamp(target, limited_[i] - most, limited_[i] + most);
+    // The mean over the step: of the ramp as long as it takes, then of what it reached.
+    input =
+        wanted + (limited_[i] - wanted) / 2 * std::min(1.0, std::abs(wanted - limited_[i]) / most);
   }
-  // A ramp's mean over the step, where it is one.
-  const double input = (wanted == target) ? target : (limited_[i] + wanted) / 2;
   limited_[i] = wanted;
   const double lag = robot_.motors.lag_s;
   if (!lag_in_wheels_ || lag <= 0) {
     speeds_[i] = wanted;
     return input;
   }
-  const double decay = std::exp(-dt_s / lag);
+  if (dt_s != decayed_s_) {
+    decayed_s_ = dt_s;
+    decay_ = std::exp(-dt_s / lag);
+  }
   const double gap = speeds_[i] - input;
-  speeds_[i] = input + gap * decay;
-  return input + gap * (1 - decay) * lag / dt_s;
+  speeds_[i] = input + gap * decay_;
+  return input + gap * (1 - decay_) * lag / dt_s;
 }
 
 std::span<const WheelMotion> RobotDrive::advance(double t_s, double dt_s, double yaw_rate_rad_s) {
@@ -235,7 +254,11 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
     // The middle of the unsteered axle is slower than a steered traction wheel.
     if (steered_traction) speed *= std::cos(steering_rad_);
     const double slow = 1 + robot_.steering.understeer_s2_m2 * speed * speed;
-    curvature_ = std::tan(steering_rad_) / *robot_.controller.wheelbase_m / slow;
+    if (steering_rad_ != tangent_of_rad_) {
+      tangent_of_rad_ = steering_rad_;
+      tangent_ = std::tan(steering_rad_);
+    }
+    curvature_ = tangent_ / *robot_.controller.wheelbase_m / slow;
     traction_m_s_ = speed;
     fresh_ = false;
     stands_ = std::abs(speed) < kStandingSpeed_m_s;
@@ -254,6 +277,11 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
   }
   fresh_ = false;
   return motions_;
+}
+
+double RobotDrive::next_change(double t_s, double until_s) const {
+  const double delay = robot_.motors.delay_s;
+  return track_.next_change(t_s - delay, until_s - delay) + delay;
 }
 
 double RobotDrive::next_motion(double t_s) const {

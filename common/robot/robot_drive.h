@@ -27,6 +27,9 @@ class CommandTrack {
 
   // REQUIRES: times that do not go back, dt_s > 0.
   const std::vector<double>& mean(double t_s, double dt_s);
+  // First time beyond `t_s` and before `until_s` from which something else is commanded; none:
+  // `until_s`.
+  double next_change(double t_s, double until_s) const;
   // First time from `t_s` on at which a value is not zero; infinity when none is.
   double next_motion(double t_s) const;
 
@@ -56,6 +59,12 @@ class RobotDrive {
   std::span<const WheelMotion> advance_motors(double t_s, double dt_s, double yaw_rate_rad_s,
                                               const FloorForces& floor = {});
 
+  // When the wheels are commanded something else, before `until_s`.
+  double next_change(double t_s, double until_s) const;
+  // Whether what wheels do depends on when a command came, beside how long it lasted.
+  bool remembers() const {
+    return robot_.motors.lag_s > 0 || robot_.motors.acceleration_limit_m_s2.has_value();
+  }
   // Whether the wheels stand and are commanded to; and when the command differs.
   bool stands() const { return stands_; }
   double next_motion(double t_s) const;
@@ -88,9 +97,11 @@ class RobotDrive {
   bool fresh_ = true;
   bool stands_ = false;
   double steering_rad_ = 0;
+  double tangent_of_rad_ = 0, tangent_ = 0;
   double curvature_ = 0;
   double traction_m_s_ = 0;
   double throttle_m_s_ = 0;
+  double decayed_s_ = 0, decay_ = 1;  // what a gap that lags falls to in the last step's time
 };
 
 }  // namespace gapfarm

@@ -34,7 +34,9 @@ void FloorParts::put(std::string_view name, double value) {
   const bool known = name.starts_with(kKnown);
   const Row* row = find(known ? name.substr(kKnown.size()) : name);
   Parts& to = known ? known_ : parts_;  // GCC 12 makes a copy of it behind .*
-  if (row != nullptr) to.*row->value = value;
+  if (row == nullptr) return;
+  to.*row->value = value;
+  to.beyond = {std::cos(to.edge_rad), std::sin(to.edge_rad)};
 }
 
 bool FloorParts::even() const {
@@ -42,30 +44,29 @@ bool FloorParts::even() const {
          known_.patch_ratio == 1;
 }
 
-double FloorParts::under(const Pose* X_WR, const RobotWheel& wheel) const {
-  if (X_WR == nullptr || even()) return 1;
-  const Pose at = *X_WR * Pose{wheel.x_m.value_or(0), wheel.y_m.value_or(0), 0};
-  const Eigen::Vector2d place = Eigen::Vector2d(at.x, at.y) - origin_m_;
+double FloorParts::under(const RobotPlace* at, const RobotWheel& wheel) const {
+  if (at == nullptr || even()) return 1;
+  const Eigen::Vector2d left(-at->ahead[1], at->ahead[0]);
+  const Eigen::Vector2d place =
+      at->place_m + wheel.x_m.value_or(0) * at->ahead + wheel.y_m.value_or(0) * left - origin_m_;
   double ratio = 1;
-  for (const Parts* part : {&parts_, &known_}) {
-    const Parts& p = *part;
-    if (p.edge_ratio != 1) {
-      const Eigen::Vector2d normal(std::cos(p.edge_rad), std::sin(p.edge_rad));
-      ratio *= ratio_beyond(p.edge_ratio, normal.dot(place) - p.edge_m);
+  for (const Parts* p : {&parts_, &known_}) {
+    if (p->edge_ratio != 1) {
+      ratio *= ratio_beyond(p->edge_ratio, p->beyond.dot(place) - p->edge_m);
     }
-    if (p.patch_ratio != 1) {
-      const double from_middle = std::hypot(place[0] - p.patch_x_m, place[1] - p.patch_y_m);
-      ratio *= ratio_beyond(p.patch_ratio, p.patch_radius_m - from_middle);
+    if (p->patch_ratio != 1) {
+      const Eigen::Vector2d middle(p->patch_x_m, p->patch_y_m);
+      ratio *= ratio_beyond(p->patch_ratio, p->patch_radius_m - (place - middle).norm());
     }
   }
   return ratio;
 }
 
-double FloorParts::under_wheels(const Pose* X_WR, const GroundRobot& robot, bool driven) const {
+double FloorParts::under_wheels(const RobotPlace* at, const GroundRobot& robot, bool driven) const {
   double sum = 0, counted = 0;
   for (const RobotWheel& wheel : robot.wheels) {
     if (driven && !wheel.driven) continue;
-    sum += under(X_WR, wheel);
+    sum += under(at, wheel);
     counted += 1;
   }
   return counted > 0 ? sum / counted : 1;

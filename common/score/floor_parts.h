@@ -4,10 +4,15 @@
 #include <Eigen/Core>
 #include <string_view>
 
-#include "common/pose/pose.h"
 #include "common/robot/robot.h"
 
 namespace gapfarm {
+
+// Where a robot is and which way it heads.
+struct RobotPlace {
+  Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d ahead = Eigen::Vector2d::UnitX();  // of length 1
+};
 
 // Ratios are of how far a wheel travels there.
 class FloorParts {
@@ -25,13 +30,14 @@ class FloorParts {
 
   bool even() const;
   // Under a wheel of a robot that stands there; 1 where nobody knows where that is.
-  double under(const Pose* X_WR, const RobotWheel& wheel) const;
+  double under(const RobotPlace* at, const RobotWheel& wheel) const;
   // The mean of all wheels, or of the driven ones.
-  double under_wheels(const Pose* X_WR, const GroundRobot& robot, bool driven) const;
+  double under_wheels(const RobotPlace* at, const GroundRobot& robot, bool driven) const;
 
  private:
   struct Parts {
     double edge_rad = 0, edge_m = 0, edge_ratio = 1;
+    Eigen::Vector2d beyond = Eigen::Vector2d::UnitX();  // of the edge, by its angle
     double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0, patch_ratio = 1;
   };
   struct Row {

@@ -56,7 +56,11 @@ Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
 
 WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
                            const std::optional<GroundReference>& reference, FitMemo* memo)
-    : robot_(robot), windows_(windows), reference_(reference), memo_(memo) {
+    : robot_(robot),
+      windows_(windows),
+      paths_(windows.runs, windows.trials),
+      reference_(reference),
+      memo_(memo) {
   if (memo != nullptr) question_ = question_of(robot, windows, reference);
   if (is_throttled(robot)) {
     shape_by_speed();
@@ -119,7 +123,7 @@ std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& 
                                                      const Eigen::VectorXd& values) const {
   const Kinematics at = kinematics(rows, values);
   if (windows_.simulated) return residuals(at, windows_.simulated({at}).front());
-  return residuals(at, kinematic_ends(robot_, windows_.runs, windows_.trials, at));
+  return residuals(at, paths_.ends(robot_, at));
 }
 
 std::vector<Eigen::Vector3d> WindowFitter::residuals(const Kinematics& at,

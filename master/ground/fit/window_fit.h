@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/robot/robot.h"
+#include "common/score/kinematic_paths.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/hypotheses.h"
 
@@ -190,6 +191,7 @@ class WindowFitter {
 
   const GroundRobot& robot_;
   const WindowSet& windows_;
+  KinematicPaths paths_;
   const std::optional<GroundReference>& reference_;
   FitMemo* memo_;
   std::string question_;  // hash of robot, windows and reference; empty without a memo

@@ -1,0 +1,244 @@
+#include "common/score/kinematic_body.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/constants.h"
+
+namespace gapfarm {
+
+KinematicBody::KinematicBody(const GroundRobot& robot, const Kinematics& at)
+    : robot_(robot),
+      load_(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0)),
+      floor_(at.origin_m),
+      reach_m_(wheel_reach_m(robot)) {
+  for (std::size_t i = 0; i < at.names.size(); ++i) {
+    put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
+  }
+  if (is_holonomic(robot_)) {
+    for (const RobotWheel& w : robot_.wheels) roller_cos_.push_back(std::cos(w.roller_angle_rad));
+    omni_.emplace(robot_);
+    omni_->load(load_);
+    tractions_ = Eigen::VectorXd::Constant(omni_->wheels(), traction_);
+    inverse_ = omni_->inverse(tractions_);
+  }
+  separation_ratio_ = separation_;
+  const auto& k = robot_.controller;
+  separation_ *= k.wheel_separation_m.value_or(1) * k.wheel_separation_multiplier;
+}
+
+GroundRobot KinematicBody::corrected() const {
+  GroundRobot robot = robot_;
+  if (grip_m_s2_) robot.friction = *grip_m_s2_ / kGravity_m_s2 / robot.friction_ratio;
+  ControllerKinematics& k = robot.controller;
+  // By four-point Coulomb theory the multiplier is 1 + (ratio wheelbase / wheel_separation)^2.
+  const double multiplier = k.wheel_separation_multiplier * separation_ratio_;
+  double along = 1, across = 1;
+  if (!skids(robot)) {
+    across = separation_ratio_;
+    if (k.wheel_separation_m) *k.wheel_separation_m *= across;
+  } else {
+    if (multiplier > 1.01 && k.wheel_separation_multiplier > 1.01) {
+      along = std::sqrt((multiplier - 1) / (k.wheel_separation_multiplier - 1));
+    }
+    k.wheel_separation_multiplier = multiplier;
+    if (k.wheelbase_m) *k.wheelbase_m *= along;
+  }
+  for (RobotWheel& w : robot.wheels) {
+    if (w.kind == WheelKind::kCaster) continue;
+    *w.x_m *= along;
+    *w.y_m *= across;
+    const double side = w.side == WheelSide::kLeft    ? left_
+                        : w.side == WheelSide::kRight ? right_
+                                                      : travel_ * ahead_;
+    *w.radius_m *= side;
+  }
+  if (is_holonomic(robot)) correct_arms(&robot);
+  if (robot.com_x_m) *robot.com_x_m = load_[0];
+  if (robot.com_y_m) *robot.com_y_m = load_[1];
+  return robot;
+}
+
+std::span<const CommandRow> KinematicBody::taken(std::span<const CommandRow> logged, double began_s,
+                                                 std::vector<CommandRow>* changed) const {
+  if (sag_ == 0 && drift_ == 0 && rate_ == 0) return logged;
+  std::vector<CommandRow>& rows = *changed;
+  rows.assign(logged.begin(), logged.end());
+  const bool throttled = is_throttled(robot_);
+  for (CommandRow& row : rows) {
+    const double left = std::max(0.0, 1 - sag_ * (row.t_s - began_s) / 60);
+    for (std::size_t c = 0; c < row.values.size(); ++c) {
+      const bool power = robot_.channels[c] != "steering";
+      if (power && (!throttled || robot_.channels[c] == "throttle")) row.values[c] *= left;
+      if (power && !throttled) row.values[c] /= 1 + rate_;
+    }
+    row.t_s += (drift_ + rate_) * (row.t_s - began_s);
+  }
+  return rows;
+}
+
+FloorForces KinematicBody::forces(const RobotPlace* at) const {
+  if (at == nullptr || !is_throttled(robot_)) return {};
+  return {kGravity_m_s2 * at->ahead.dot(downhill_),
+          kGravity_m_s2 * (1 - floor_.under_wheels(at, robot_, false))};
+}
+
+Twist KinematicBody::velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive,
+                              const RobotPlace* at) const {
+  const Twist v = on_level(wheels, drive, at);
+  return at == nullptr ? v : v + on_slope(wheels, v, *at);
+}
+
+Twist KinematicBody::on_level(std::span<const WheelMotion> wheels, const RobotDrive& drive,
+                              const RobotPlace* at) const {
+  if (is_throttled(robot_)) return on_floor(ahead_ * drive.traction_m_s(), drive.curvature());
+  if (is_steered(robot_)) {
+    return on_floor(ahead_ * floor_.under_wheels(at, robot_, true) * drive.traction_m_s(),
+                    drive.curvature());
+  }
+  if (is_holonomic(robot_)) {
+    Eigen::Vector3d twist = Eigen::Vector3d::Zero();
+    if (at != nullptr) stand_on(*at);
+    Eigen::Index n = 0;
+    for (std::size_t i = 0; i < wheels.size(); ++i) {
+      const RobotWheel& w = robot_.wheels[i];
+      if (!w.driven) continue;
+      twist += inverse_.col(n++) * (wheels[i].speed_m_s * roller_cos_[i]);
+    }
+    return {travel_ * ahead_ * twist[0], travel_ * aside_ * twist[1], travel_ * turn_ * twist[2]};
+  }
+  double sum[2] = {0, 0};
+  double count[2] = {0, 0};
+  for (std::size_t i = 0; i < wheels.size(); ++i) {
+    if (!robot_.wheels[i].driven) continue;
+    const RobotWheel& w = robot_.wheels[i];
+    const int side = w.side == WheelSide::kLeft ? 0 : 1;
+    sum[side] += floor_.under(at, w) * wheels[i].speed_m_s;
+    count[side] += 1;
+  }
+  const double l = left_ * sum[0] / std::max(count[0], 1.0);
+  const double r = right_ * sum[1] / std::max(count[1], 1.0);
+  return {(l + r) / 2, 0, (r - l) / separation_};
+}
+
+void KinematicBody::stand_on(const RobotPlace& at) const {
+  bool changed = false;
+  Eigen::Index n = 0;
+  for (const RobotWheel& w : robot_.wheels) {
+    if (!w.driven) continue;
+    const double traction = traction_ * floor_.under(&at, w);
+    changed = changed || traction != tractions_[n];
+    tractions_[n++] = traction;
+  }
+  if (changed) inverse_ = omni_->inverse(tractions_);
+}
+
+void KinematicBody::put(const std::string& name, double value) {
+  RobotThrottle& t = robot_.throttle;
+  if (is_magnitude(name)) value = std::abs(value);
+  if (name == "left") left_ *= value;
+  if (name == "right") right_ *= value;
+  if (name == "travel" && is_holonomic(robot_)) {
+    travel_ = value;
+  } else if (name == "travel") {
+    left_ *= value;
+    right_ *= value;
+    ahead_ *= value;
+  }
+  if (name == "traction") traction_ = value;
+  if (name == "load_x") load_[0] = value;
+  if (name == "load_y") load_[1] = value;
+  floor_.put(name, value);
+  if (name == "downhill_x") downhill_[0] = value;
+  if (name == "downhill_y") downhill_[1] = value;
+  if (name == "separation") separation_ = value;
+  if (name == "ahead") ahead_ *= value;
+  if (name == "aside") aside_ *= value;
+  if (name == "turn") turn_ *= value;
+  if (name == "arm") turn_ /= value;
+  if (name == "steering_gain") robot_.steering.gain *= value;
+  if (name == "steering_left" || name == "steering_right") {
+    const double sign = name == "steering_left" ? 1 : -1;
+    for (RobotSteering::Point& p : robot_.steering.table) {
+      if (p.command * sign > 0) p.angle_rad *= value;
+    }
+  }
+  if (name == "wheelbase") *robot_.controller.wheelbase_m *= value;
+  if (name == "power") t.gain *= value;
+  if (name == "dead_band") robot_.motors.dead_band = value;
+  if (name == "ramp") {
+    robot_.motors.acceleration_limit_m_s2 =
+        std::abs(value) > 1e-6 ? std::optional(1 / std::abs(value)) : std::nullopt;
+  }
+  if (name == "sag") sag_ = value;
+  if (name == "drift") drift_ = value;
+  if (name == "rate") rate_ = value;
+  if (name == "grip") grip_m_s2_ = std::exp(value);
+  if (name == "slip_angle") slip_angle_rad_ = value;
+  if (name == "grip_shape") grip_shape_ = std::exp(value);
+  if (name == "pose_scale") scale_ = value;
+  if (name == "aspect") aspect_ = value;
+  if (name == "steering_offset") robot_.steering.offset_rad += value;
+  if (name == "understeer") robot_.steering.understeer_s2_m2 = value;
+  if (name == "gain") t.gain = value;
+  if (name == "zero") t.zero = value;
+  if (name == "back_emf") t.back_emf = value;
+  if (name == "drag") t.drag = value;
+  if (name == "coulomb") t.coulomb = value;
+  if (name == "cornering") t.cornering = value;
+  if (name == "lag") robot_.motors.lag_s = value;
+  if (name == "delay") robot_.motors.delay_s = value;
+  if (name == "marker_x") robot_.X_RM.x = value;
+  if (name == "marker_y") robot_.X_RM.y = value;
+  if (name == "marker_yaw") robot_.X_RM.theta = value;
+}
+
+Twist KinematicBody::on_slope(std::span<const WheelMotion> wheels, const Twist& v,
+                              const RobotPlace& at) const {
+  const Eigen::Vector2d left(-at.ahead[1], at.ahead[0]);
+  const Eigen::Vector2d down(at.ahead.dot(downhill_), left.dot(downhill_));
+  if (skids(robot_)) {
+    const double dragged = std::abs(v[2]) * reach_m_;
+    return {dragged * down[0], dragged * down[1], 0};
+  }
+  if (is_throttled(robot_)) return Twist::Zero();  // forces()
+  if (is_steered(robot_)) return {std::abs(v[0]) * down[0], 0, 0};
+  double rolled = 0, driven = 0;
+  for (std::size_t i = 0; i < wheels.size(); ++i) {
+    if (!robot_.wheels[i].driven) continue;
+    rolled += std::abs(wheels[i].speed_m_s);
+    driven += 1;
+  }
+  rolled /= std::max(driven, 1.0);
+  return {rolled * down[0], is_holonomic(robot_) ? rolled * down[1] : 0, 0};
+}
+
+Twist KinematicBody::on_floor(double v, double curvature) const {
+  if (!grip_m_s2_) return {v, 0, v * curvature};
+  const double asked = v * v * curvature / *grip_m_s2_;
+  if (asked == 0) return {v, 0, 0};
+  // (1 + |asked|^p)^(-1/p), by what costs half of two powers.
+  const double power = std::exp(grip_shape_ * std::log(std::abs(asked)));
+  const double held = std::exp(-std::log1p(power) / grip_shape_);
+  return {v, -slip_angle_rad_ * v * asked * held, v * curvature * held};
+}
+
+void KinematicBody::correct_arms(GroundRobot* robot) const {
+  for (RobotWheel& w : robot->wheels) {
+    if (w.kind == WheelKind::kCaster) continue;
+    if (w.kind != WheelKind::kMecanum) {
+      *w.x_m *= ahead_ / turn_;
+      *w.y_m *= ahead_ / turn_;
+      continue;
+    }
+    const double before = std::tan(std::abs(w.roller_angle_rad));
+    const double tangent = before * ahead_ / aside_;
+    const double arm = std::abs(*w.y_m) + std::abs(*w.x_m) * before;
+    const double aside = arm * ahead_ / turn_ - std::abs(*w.x_m) * tangent;
+    if (!(tangent > 0 && aside > 0)) return;  // no such wheel
+    w.roller_angle_rad = std::copysign(std::atan(tangent), w.roller_angle_rad);
+    *w.y_m = std::copysign(aside, *w.y_m);
+  }
+}
+
+}  // namespace gapfarm
