@@ -22,6 +22,16 @@ auto from_scan(Eigen::VectorXd (*scan)(const WindowFitter&, const std::vector<Fi
                 const Eigen::VectorXd& values) { return scan(fitter, rows, values); };
 }
 
+// Where there is none of it there is no slope to it either.
+void only_more(GroundHypothesis& hypothesis) {
+  hypothesis.only_more = true;
+  const std::string name = hypothesis.freed.front().name;
+  hypothesis.propose = [name](const WindowFitter& fitter, const WindowFit&,
+                              const std::vector<FitRow>& rows, const Eigen::VectorXd& values) {
+    return scan_size(fitter, rows, values, row_index(rows, name));
+  };
+}
+
 }  // namespace
 
 void Catalogue::sizes() {
@@ -88,8 +98,8 @@ void Catalogue::motors() {
         {{"drift", 0, 2e-5, "rate", "s/s"}});
   value("clock_drift", {"clock_offset"}, "the rate of the robot's clock against the tracker's",
         {{"rate", 0, 2e-5, "rate", "s/s"}});
-  value("battery_sag", {}, "what the drive loses a minute", {{"sag", 0, 0.005, "rate", "1/min"}})
-      .only_more = true;
+  only_more(value("battery_sag", {}, "what the drive loses a minute",
+                  {{"sag", 0, 0.005, "rate", "1/min"}}));
   // Motors lie before what was measured, unless the file states them all the same.
   if (!robot_.measured || robot_.motors.lag_s > 0) {
     value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
@@ -104,15 +114,14 @@ void Catalogue::motors() {
   }
   if (!robot_.measured) {
     const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
-    value("motor_deadband", {}, "commands that move nothing",
-          {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}})
-        .only_more = true;
+    only_more(
+        value("motor_deadband", {}, "commands that move nothing",
+              {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}}));
   }
   const auto& limit = robot_.motors.acceleration_limit_m_s2;
   if (robot_.measured && !limit) return;
-  value("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
-        {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m", true}})
-      .only_more = true;
+  only_more(value("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
+                  {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m", true}}));
 }
 
 void Catalogue::marker() {

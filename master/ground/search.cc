@@ -202,7 +202,8 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   for (const auto& [offer, fit] : tried) offers.push_back(offer);
   search->offers.push_back(offers);
   const double least = least_gain(*search);
-  while (!tried.empty() && (tried.back().first.gain < least || tried.size() > kMostCandidates)) {
+  const double worth = std::min(least, kLeastGroundGain);
+  while (!tried.empty() && (tried.back().first.gain < worth || tried.size() > kMostCandidates)) {
     tried.pop_back();
   }
   const auto shown = [&](const Candidate& c) {
@@ -212,7 +213,9 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   for (auto& [offer, fit] : tried) {
     Candidate& c =
         candidates.emplace_back(predict_held_out(fitter, work, *search, offer, std::move(fit)));
-    c.may_be_named = may_be_named(c.held_out_gain) && shown(c);
+    // What a log is sure enough of to close more than is tolerated needs no more.
+    const bool enough = c.offer.gain >= least || c.held_out_gain.lo > kToleratedGap;
+    c.may_be_named = enough && may_be_named(c.held_out_gain) && shown(c);
   }
   // Held out, values that gain far less than others do with small moves of the rest do not compete.
   double most = 0;
