@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "common/base/ranges.h"
 #include "common/base/suggest.h"
@@ -21,6 +22,8 @@ namespace {
 
 // Seconds since 1970 are 2e9; what is greater than this was never measured.
 constexpr double kGreatest = 1e12;
+// What queues and networks hold up comes later by less, s.
+constexpr double kLatest_s = 1;
 
 struct Kind {
   const char* name;
@@ -31,11 +34,14 @@ struct Kind {
 struct Stretch {
   std::vector<double> t_s;
   std::vector<std::vector<double>> rows;
+  bool behind = false;  // the time of the row before this one goes back
 };
 using Stretches = std::map<std::string, Stretch>;  // by run
 
 struct Tally {
   std::size_t taken = 0, blank = 0, back = 0, dropped = 0;
+  std::string place;  // where times go back, for an error
+  bool set_back = false;
 };
 
 // A file's name without its ending; its folder's where the name says nothing.
@@ -56,11 +62,12 @@ class Importer {
     for (std::size_t i = 0; i < recordings_.size(); ++i) {
       for (const Kind& kind : kinds()) RETURN_IF_ERROR(take(i, kind));
     }
-    for (const Kind& kind : {kinds()[0], kinds()[1]}) {
+    for (const Kind& kind : kinds()) {
       const Tally& tally = tallies_[kind.name];
-      if (!kind.map->columns.empty() && tally.taken == 0)
+      const bool wanted = kind.map == &map_.poses || kind.map == &map_.commands;
+      if (wanted && !kind.map->columns.empty() && tally.taken == 0)
         return no_rows(recordings_, *kind.map, kind.name);
-      if (tally.back > tally.taken) return out_of_order(kind, tally);
+      if (tally.set_back || tally.back > tally.taken) return out_of_order(kind, tally);
     }
     assemble();
     for (const LoggedRun& logged : out_.log.runs) {
@@ -72,12 +79,13 @@ class Importer {
   }
 
  private:
-  // Several runs, or rows in no order.
-  Error out_of_order(const Kind& kind, const Tally& tally) const {
-    return Error{recordings_.front().file + ": found " + std::to_string(tally.back) + " of " +
+  // Several runs, a clock that was set back, or rows in no order.
+  static Error out_of_order(const Kind& kind, const Tally& tally) {
+    return Error{tally.place + ": found " + std::to_string(tally.back) + " of " +
                  std::to_string(tally.back + tally.taken) + " rows of " + kind.name +
-                 " at times before the row above, expected the order of time; sort them, or name "
-                 "runs apart by a column and write run = \"COLUMN\" in the map"};
+                 " at times before the row above, expected the order of time; sort them, cut the "
+                 "recording there, take another clock of it as t in the map, or name runs apart by "
+                 "a column and write run = \"COLUMN\" in the map"};
   }
 
   std::vector<Kind> kinds() const {
@@ -169,7 +177,7 @@ class Importer {
         }
       }
       if (!at_its_time(map, poses, before[name], values)) continue;
-      put(tally, stretches_[kind.name][recording][name], values);
+      put(tally, stretches_[kind.name][recording][name], values, table.source, r);
     }
     used_.insert(table.source);
     return {};
@@ -205,9 +213,20 @@ class Importer {
     return (name.empty() ? "part" : name) + "_" + std::to_string(part);
   }
 
-  void put(Tally& tally, Stretch& stretch, std::vector<double> values) {
-    if (!stretch.t_s.empty() && values.front() < stretch.t_s.back()) {
+  static void put(Tally& tally, Stretch& stretch, std::vector<double> values,
+                  const std::string& source, std::size_t row) {
+    const double last_s = stretch.t_s.empty() ? values.front() : stretch.t_s.back();
+    const bool behind = values.front() < last_s;
+    const bool alone = !std::exchange(stretch.behind, behind);
+    if (behind) {
       ++tally.back;
+      if (tally.set_back) return;
+      if (alone) {
+        tally.place = source + ": row " + std::to_string(row + 1) +
+                      formatted(" (%.3f s", values[0]) + formatted(" after %.3f s)", last_s);
+      }
+      // Not where one row alone came late.
+      tally.set_back = !alone && last_s - values.front() > kLatest_s;
       return;
     }
     stretch.t_s.push_back(values.front());

@@ -18,7 +18,7 @@ struct ImportedRuns {
 // Times in s from the first one, poses in m and rad about the world's upward axis, commands in SI.
 // Rows without a number where one is needed, poses whose quaternion is none and times that go back
 // are omitted and counted.  Errors: no rows of poses or commands where the map has them, a column
-// that is not there, rims' speeds in m/s without a wheel radius.
+// that is not there, a clock that was set back, rims' speeds in m/s without a wheel radius.
 Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map);
 
 // commands.csv, poses.csv, wheels.csv and gyro.csv (empty: there are none).

@@ -270,8 +270,15 @@ TEST(Tables, RowsInNoOrderAreRefused) {
   EXPECT_TRUE(to_runs({table_of(head + run + "3.5,2,0,0,1,1\n")}, *map));
   const auto refused = to_runs({table_of(head + run + run + run)}, *map);
   ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().message, StartsWith("f.csv: found 8 of 15 rows of poses at times"));
+  EXPECT_THAT(refused.error().message,
+              StartsWith("f.csv: row 6 (0.000 s after 4.000 s): found 8 of 15 rows of poses"));
   EXPECT_THAT(refused.error().message, HasSubstr("run = \"COLUMN\""));
+  // A clock that is set back once, by less than what follows.
+  const auto set_back =
+      to_runs({table_of(head + run + "2,5,0,0,1,1\n" + run + "5,6,0,0,1,1\n")}, *map);
+  ASSERT_FALSE(set_back);
+  EXPECT_THAT(set_back.error().message,
+              StartsWith("f.csv: row 6 (2.000 s after 4.000 s): found 5"));
 }
 
 }  // namespace gapfarm::tables_test
