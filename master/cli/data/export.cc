@@ -58,7 +58,7 @@ std::string usual_controller(DriveKind drive) {
 Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, RosExport* data) {
   if (urdf.empty()) {
     for (const RobotWheel& w : robot.wheels) {
-      if (w.driven) data->wheels.push_back({w.name + "_link", {}, {}});
+      if (w.driven) data->wheels.push_back({w.name + "_link", {}, {}, Eigen::Vector3d::UnitY()});
     }
     return {};
   }
@@ -68,7 +68,7 @@ Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, 
   for (std::size_t i = 0; i < reading.sources.size(); ++i) {
     const WheelSource& source = reading.sources[i];
     if (reading.robot.wheels[i].driven) {
-      data->wheels.push_back({source.link, source.mu1, source.mu2});
+      data->wheels.push_back({source.link, source.mu1, source.mu2, source.axle});
     }
   }
   return {};
@@ -123,8 +123,8 @@ Json export_json(const RosExport& data) {
                {"robot", values_json(data.sizes, "key", "known")},
                {"kinematics", values_json(data.kinematics)}};
   if (data.covariance.size() > 0) json["covariance"] = data.covariance;
-  if (data.friction.across) json["mu1"] = *data.friction.along;
-  if (data.friction.across) json["mu2"] = *data.friction.across;
+  if (data.friction.across) json["mu1"] = *data.friction.across;
+  if (data.friction.across) json["mu2"] = *data.friction.along;
   return json;
 }
 

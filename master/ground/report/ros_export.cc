@@ -194,8 +194,8 @@ std::string ros_table(const RosExport& data) {
       return mu ? fmt::format("{:.3g}", *mu) : std::string("none");
     };
     text += fmt::format("{:<52} {:>10}   {:.3g} {:.3g}\n", "<gazebo> mu1 mu2 of " + wheel.link,
-                        had(wheel.mu1) + " " + had(wheel.mu2), *data.friction.along,
-                        *data.friction.across);
+                        had(wheel.mu1) + " " + had(wheel.mu2), *data.friction.across,
+                        *data.friction.along);
   }
   text += data.friction.across ? "  friction: " + data.friction.from + "\n"
                                : "  friction: this log does not show it\n";
@@ -220,12 +220,15 @@ std::string ros_yaml(const RosExport& data) {
 std::string ros_gazebo(const RosExport& data) {
   if (!data.friction.across) return {};
   std::string text = "<!-- From " + data.source + ", fitted to " + logs_text(data.logs) + ": " +
-                     data.friction.from + ". mu1 is along the wheel, mu2 across. -->\n";
+                     data.friction.from +
+                     ". mu1 is along the axle (fdir1), which alone stays where it is as "
+                     "the wheel turns, mu2 along the wheel. -->\n";
   for (const RosWheel& wheel : data.wheels) {
+    const Eigen::Vector3d axle = (wheel.axle * 1e6).array().round() / 1e6 + 0.0;
     text += fmt::format(
         "<gazebo reference=\"{}\">\n  <mu1>{:.4g}</mu1>\n  <mu2>{:.4g}</mu2>\n"
-        "  <fdir1>1 0 0</fdir1>\n</gazebo>\n",
-        wheel.link, *data.friction.along, *data.friction.across);
+        "  <fdir1>{:.6g} {:.6g} {:.6g}</fdir1>\n</gazebo>\n",
+        wheel.link, *data.friction.across, *data.friction.along, axle[0], axle[1], axle[2]);
   }
   return text;
 }

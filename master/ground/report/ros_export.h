@@ -50,7 +50,8 @@ struct RosFriction {
 
 struct RosWheel {
   std::string link;
-  std::optional<double> mu1, mu2;  // as the URDF has them
+  std::optional<double> mu1, mu2;                   // as the URDF has them
+  Eigen::Vector3d axle = Eigen::Vector3d::UnitY();  // in the axes of its collision
 };
 
 struct RosExport {

@@ -110,7 +110,7 @@ class Understanding {
       wheel.driven = false;
       wheel.x_m = along(support.point_B_m - origin_B_);
       wheel.y_m = across(support.point_B_m - origin_B_);
-      add(wheel, {"", support.name, support.line, "", "", false, {}, {}});
+      add(wheel, {"", support.name, support.line, "", "", false, {}, {}, false, {}});
     }
   }
 
@@ -152,10 +152,16 @@ class Understanding {
     } else {
       source.turns_backward = std::abs(heading) > pi / 2;
     }
+    source.axle = poses_.find(source.link)->second.linear().transpose() * found.axis_B;
+    if (!found.link->collisions.empty()) {
+      source.axle = found.link->collisions.front().X_LG.linear().transpose() * source.axle;
+    }
     for (const UrdfSurface& surface : model_.surfaces) {
       if (surface.link != found.link->name) continue;
       if (surface.mu1) source.mu1 = surface.mu1;
       if (surface.mu2) source.mu2 = surface.mu2;
+      if (!surface.fdir1) continue;
+      source.mu1_across = std::abs(surface.fdir1->normalized().dot(source.axle)) > std::sqrt(0.5);
     }
     if (robot().drive == DriveKind::kMecanum && wheel.driven) {
       wheel.kind = WheelKind::kMecanum;
@@ -254,8 +260,8 @@ class Understanding {
                                    "' stand for wheels that never slip, and were not taken");
         return;
       }
-      robot().friction = *source.mu1;
-      robot().friction_ratio = mu2 / *source.mu1;
+      robot().friction = source.mu1_across ? mu2 : *source.mu1;
+      robot().friction_ratio = source.mu1_across ? *source.mu1 / mu2 : mu2 / *source.mu1;
       return;
     }
   }

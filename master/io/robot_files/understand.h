@@ -17,9 +17,11 @@ struct WheelSource {
   std::string link;
   int line = 0;
   std::string radius_from;
-  std::string turning;          // the joint that steers or swivels it; empty: none
-  bool turns_backward = false;  // a positive turn of the joint rolls the robot back
-  std::optional<double> mu1, mu2;
+  std::string turning;             // the joint that steers or swivels it; empty: none
+  bool turns_backward = false;     // a positive turn of the joint rolls the robot back
+  std::optional<double> mu1, mu2;  // as the URDF has them
+  bool mu1_across = false;         // by its fdir1
+  Eigen::Vector3d axle = Eigen::Vector3d::UnitY();  // in the axes of its collision, as fdir1
 };
 
 struct RobotOutline {

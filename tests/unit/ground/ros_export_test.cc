@@ -51,12 +51,16 @@ TEST(RosExport, TakesFrictionFromHowASkidSteerTurns) {
   const ReportedValues reported = reported_of(kHusky, {{"separation", 1, 1, {0.98, 1.02}, true}});
   RosExport data{"diagnosis", reported.logs,          "c", ros_values(reported),
                  {},          ros_friction(reported), {}};
-  data.wheels = {{"front_left_wheel_link", 1.0, 1.0}};
+  data.wheels = {{"front_left_wheel_link", 1.0, 1.0, Eigen::Vector3d(1e-9, 0, 1)}};
   ASSERT_TRUE(data.friction.across.has_value());
   EXPECT_NEAR(*data.friction.across, *data.friction.along, 1e-9);  // as the file has it
   const std::string xml = ros_gazebo(data);
   EXPECT_NE(xml.find("<gazebo reference=\"front_left_wheel_link\">"), std::string::npos);
   EXPECT_NE(xml.find("<mu1>0.7</mu1>"), std::string::npos) << xml;
+  // The axle is the one direction that does not turn with the wheel.
+  data.friction.across = 1.5;
+  EXPECT_NE(ros_gazebo(data).find("<mu1>1.5</mu1>\n  <mu2>0.7</mu2>\n  <fdir1>0 0 1</fdir1>"),
+            std::string::npos);
   EXPECT_NE(ros_table(data).find("1 1"), std::string::npos);
 }
 

@@ -267,6 +267,17 @@ TEST(UnderstandRobot, HoldsPluginsAgainstBoth) {
   EXPECT_THAT(r->disagreements, Contains(HasSubstr("wheel_radius 0.1, but r.urdf")));
 }
 
+// fdir1 is in the axes of the collision, whose cylinder lies along z.
+TEST(UnderstandRobot, FrictionAlongTheAxleIsAcrossTheWheel) {
+  for (const auto& [direction, along] : {std::pair{"0 0 1", 0.7}, {"1 0 0", 1.5}}) {
+    const auto r = read(two_wheels(std::string("<gazebo reference='lw'><mu1>1.5</mu1>") +
+                                   "<mu2>0.7</mu2><fdir1>" + direction + "</fdir1></gazebo>"));
+    ASSERT_TRUE(r) << r.error().message;
+    EXPECT_EQ(r->robot.friction, along);
+    EXPECT_NEAR(r->robot.friction_ratio, 1.5 * 0.7 / along / along, 1e-12);
+  }
+}
+
 TEST(WheelLoads, FollowFromBalance) {
   // Three points: loads are determined by the torques alone.
   const auto three = wheel_loads({{0, 0.2}, {0, -0.2}, {-0.3, 0}}, {-0.1, 0}, 90);

@@ -57,8 +57,9 @@ struct UrdfJoint {
 // <gazebo reference="LINK">: friction of the link's surface.
 struct UrdfSurface {
   std::string link;
-  std::optional<double> mu1;
+  std::optional<double> mu1;  // along fdir1
   std::optional<double> mu2;
+  std::optional<Eigen::Vector3d> fdir1;  // in the axes of the link's collision
 };
 
 struct UrdfParameter {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <set>
+#include <sstream>
 
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/urdf/xml_reader.h"
@@ -169,6 +170,13 @@ void Reader::read_gazebo(const XMLElement& element) {
       const auto value = parse_double(value_of(*child));
       if (value && std::isfinite(*value)) (name == "mu1" ? surface.mu1 : surface.mu2) = *value;
       any = true;
+    }
+    if (name == "fdir1") {
+      std::istringstream text(value_of(*child));
+      Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+      std::string word;
+      for (double& v : direction) v = text >> word ? parse_double(word).value_or(NAN) : NAN;
+      if (direction.allFinite() && !direction.isZero()) surface.fdir1 = direction;
     }
   }
   if (any && !reference.empty()) model_.surfaces.push_back(std::move(surface));
