@@ -6,6 +6,7 @@
 #include "common/math/statistics.h"
 #include "common/recordings/increment_noise.h"
 #include "master/io/logs/column_map.h"
+#include "master/io/logs/frames.h"
 
 namespace gapfarm {
 namespace {
@@ -42,10 +43,7 @@ std::string plain(const std::string& name) {
 // "*." in front: any path before; the first alias that a column has wins.
 bool fits(const std::string& column, const std::string& alias) {
   if (alias.rfind("*.", 0) != 0) return column == alias;
-  const std::string end = alias.substr(1);
-  return column == alias.substr(2) ||
-         (column.size() > end.size() &&
-          column.compare(column.size() - end.size(), end.size(), end) == 0);
+  return column == alias.substr(2) || column.ends_with(alias.substr(1));
 }
 
 using Aliases = std::vector<std::string>;
@@ -143,7 +141,12 @@ class Guess {
 
   LogMap run() {
     for (const Recording& recording : recordings_) {
-      for (const LogTable& table : recording.tables) consider(table);
+      for (const LogTable& table : recording.tables) consider(recording, table);
+    }
+    if (!odometry_.empty()) {
+      map_.notes.push_back("poses are odometry (" + odometry_ +
+                           "): wheels' slip cannot be seen in what wheels say; record poses by "
+                           "motion capture, laser or tags");
     }
     return std::move(map_);
   }
@@ -170,13 +173,15 @@ class Guess {
     return near ? stamp : time;
   }
 
-  void consider(const LogTable& table) {
+  void consider(const Recording& recording, const LogTable& table) {
     const std::string time = time_of(table);
     if (time.empty()) return;
     // A better pose than odometry replaces it: odometry cannot show slip.
-    const bool odometry = table.type.find("Odometry") != std::string::npos;
-    if (map_.poses.columns.empty() || (odometry_ && !odometry)) guess_poses(table, time, odometry);
-    if (map_.commands.columns.empty() && !odometry) guess_commands(table, time);
+    const bool odometry = is_odometry(table);
+    const bool wanted = map_.poses.columns.empty() || (!odometry_.empty() && !odometry);
+    if (wanted && shows_robot(recording, table)) guess_poses(table, time, odometry);
+    const bool measured = table.type.find("Odometry") != std::string::npos;
+    if (map_.commands.columns.empty() && !measured) guess_commands(table, time);
     if (map_.wheels.columns.empty()) guess_wheels(table, time);
     const std::string rate = column_of(table, {"angular_velocity.z", "yaw_rate", "gyro_z"});
     if (!map_.gyro.columns.empty() || rate.empty()) return;
@@ -216,20 +221,18 @@ class Guess {
       const std::string column = column_of(table, role.aliases);
       if (!column.empty()) found.columns.push_back({role.name, column, ""});
     }
-    bool quaternion = true;
-    for (const char* part : {"qx", "qy", "qz", "qw"}) {
-      quaternion = quaternion && found.find(part) != nullptr;
-    }
-    const bool place = found.find("x") != nullptr && found.find("y") != nullptr;
+    const auto there = [&](const char* role) { return found.find(role) != nullptr; };
+    const bool quaternion = there("qx") && there("qy") && there("qz") && there("qw");
+    const bool place = there("x") && there("y");
     found.increments = place && plain(found.find("x")->column) == "dx";
     if (found.increments) guess_noise(table, found);
-    const bool heading = quaternion || found.find("theta") != nullptr;
+    const bool heading = quaternion || there("theta");
     if (place && !heading && map_.no_heading.empty()) map_.no_heading = table.source;
     if (!place || !heading) return;
     if (table.type == "motive") found.up = "y";
     found.keep = column_of(table, kKeep);
     auto& columns = found.columns;
-    const bool has_theta = found.find("theta") != nullptr;
+    const bool has_theta = there("theta");
     std::erase_if(columns, [&](const MappedColumn& c) {
       const bool part = c.role[0] == 'q' && c.role.size() == 2;
       return (c.role == "z" && found.up == "z") || (part && has_theta);
@@ -239,13 +242,8 @@ class Guess {
       if (c.role == "x" || c.role == "y" || c.role == "z") c.unit = unit;
       if (c.role == "theta") c.unit = angle_unit(table, c.column);
     }
-    odometry_ = odometry;
+    odometry_ = odometry ? table.source : "";
     map_.poses = std::move(found);
-    if (odometry) {
-      map_.notes.push_back("poses are odometry (" + table.source +
-                           "): wheels' slip cannot be seen in what wheels say; record poses by "
-                           "motion capture, laser or tags");
-    }
   }
 
   static void guess_noise(const LogTable& table, TableMap& increments) {
@@ -390,7 +388,7 @@ class Guess {
 
   const std::vector<Recording>& recordings_;
   LogMap map_;
-  bool odometry_ = false;
+  std::string odometry_;  // the table, where poses are such
 };
 
 }  // namespace

@@ -21,6 +21,8 @@ struct LogTable {
   // Of each column: its long name, and the unit that the file states.  Empty: no row has them.
   std::vector<std::string> titles = {};
   std::vector<CsvField> units = {};
+  // Of a bag's poses: the frame that they are in, and of transforms the one that they place.
+  std::string frame = {}, child = {};
 
   std::size_t rows() const { return columns.empty() ? 0 : values.size() / columns.size(); }
   double at(std::size_t row, std::size_t column) const {

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "common/trials/text/csv.h"
+#include "master/io/logs/frames.h"
 
 namespace gapfarm {
 namespace {
@@ -10,6 +11,11 @@ namespace {
 // Ten hours of a hundred topics' numbers at 50 Hz; memory for it is there.
 constexpr std::size_t kMostNumbers = 100'000'000;
 constexpr std::size_t kMostColumns = 512;  // of one topic
+
+std::string text_in(const MessageContent& content, const std::string& path) {
+  const auto found = content.texts.find(path);
+  return found == content.texts.end() ? "" : found->second;
+}
 
 // "velocity[3]" to its array and element.
 bool element_of(const std::string& path, std::string& array, std::string& index) {
@@ -28,10 +34,17 @@ Topics::Topics(std::string file, std::string format) {
 }
 
 Status Topics::put(const std::string& topic, const std::string& type, double t_s,
-                   const std::vector<std::pair<std::string, double>>& numbers) {
+                   const std::vector<std::pair<std::string, double>>& numbers,
+                   const MessageContent& content, const std::string& at) {
   Rows& rows = topics_[topic];
   if (rows.names.empty()) {
     rows.type = type;
+    rows.frame = text_in(content, at + "header.frame_id");
+    rows.child = at.empty() ? "" : text_in(content, at + "child_frame_id");
+    // "/map" of tf 1 is "map".
+    for (std::string* frame : {&rows.frame, &rows.child}) {
+      if (frame->starts_with('/')) frame->erase(0, 1);
+    }
     rows.names.emplace_back("t");
     rows.columns["t"] = 0;
   }
@@ -76,19 +89,17 @@ Status Topics::add(const BagTopic& of, double t_s, std::string_view bytes) {
       path = array + "." + (joint == content->texts.end() ? index : joint->second);
     }
   }
-  if (name != "TFMessage") return put(topic, type, t_s, content->numbers);
+  if (name != "TFMessage") return put(topic, type, t_s, content->numbers, *content);
   // One message holds transforms of many frames.
-  std::map<std::string, std::vector<std::pair<std::string, double>>> frames;
+  std::map<std::string, std::vector<std::pair<std::string, double>>> frames;  // by path
   for (const auto& [path, value] : content->numbers) {
     const std::size_t dot = path.find("].");
     if (dot == path.npos) continue;
-    const std::string at = path.substr(0, dot + 1);
-    const auto child = content->texts.find(at + ".child_frame_id");
-    const std::string frame = child == content->texts.end() ? "" : child->second;
-    frames[topic + ":" + frame].emplace_back(path.substr(dot + 2), value);
+    frames[path.substr(0, dot + 2)].emplace_back(path.substr(dot + 2), value);
   }
-  for (const auto& [frame, numbers] : frames) {
-    if (Status s = put(frame, type, t_s, numbers); !s) return s;
+  for (const auto& [at, numbers] : frames) {
+    const std::string table = topic + ":" + text_in(*content, at + "child_frame_id");
+    if (Status s = put(table, type, t_s, numbers, *content, at); !s) return s;
   }
   return {};
 }
@@ -110,9 +121,12 @@ Recording Topics::finish() {
         table.values[r * rows.names.size() + column] = value;
       }
     }
+    table.frame = std::move(rows.frame);
+    table.child = std::move(rows.child);
     rows.rows = {};
     recording_.tables.push_back(std::move(table));
   }
+  add_localised(recording_);
   for (const auto& [topic, what] : skipped_) {
     recording_.notes.push_back("left: " + recording_.file + " " + topic + " (" + what.first + ", " +
                                std::to_string(what.second) + " messages)");

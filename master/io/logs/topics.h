@@ -33,14 +33,16 @@ class Topics {
 
  private:
   struct Rows {
-    std::string type;
+    std::string type, frame, child;
     std::map<std::string, std::size_t, std::less<>> columns;
     std::vector<std::string> names;
     std::vector<std::vector<std::pair<std::size_t, double>>> rows;
   };
   Status skip(const BagTopic& of);
+  // `at`: the path of what the numbers are of, for its frames.
   Status put(const std::string& topic, const std::string& type, double t_s,
-             const std::vector<std::pair<std::string, double>>& numbers);
+             const std::vector<std::pair<std::string, double>>& numbers,
+             const MessageContent& content, const std::string& at = "");
 
   Recording recording_;
   std::map<std::string, Rows> topics_;

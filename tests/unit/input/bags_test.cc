@@ -6,11 +6,13 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "common/trials/files.h"
 #include "master/io/logs/decompress.h"
 #include "master/io/logs/message.h"
 #include "master/io/logs/to_runs.h"
+#include "master/io/logs/topics.h"
 #include "tests/fuzz/memory_source.h"
 
 namespace gapfarm::bags_test {
@@ -66,6 +68,81 @@ INSTANTIATE_TEST_SUITE_P(Formats, Bags, testing::ValuesIn(kFiles), [](const auto
   for (char& c : name) c = c == '.' ? '_' : c;
   return name;
 });
+
+// Transforms x ahead, turned by `yaw`; each message has what is given, {parent, child, x, yaw}.
+struct Placed {
+  std::string parent, child;
+  double x, yaw;
+};
+class Transforms {
+ public:
+  void add(double t_s, const std::vector<Placed>& placed) {
+    bytes_.assign("\0\1\0\0", 4);
+    number<std::uint32_t>(placed.size());
+    for (const Placed& one : placed) {
+      number<std::uint32_t>(t_s);
+      number<std::uint32_t>(0);
+      for (const std::string& frame : {one.parent, one.child}) {
+        number<std::uint32_t>(frame.size() + 1);
+        bytes_ += frame + '\0';
+      }
+      for (const double v : {one.x, 0., 0., 0., 0., std::sin(one.yaw / 2), std::cos(one.yaw / 2)}) {
+        number<double>(v);
+      }
+    }
+    EXPECT_TRUE(topics_.add(tf_, t_s, bytes_));
+  }
+  Recording finish() { return topics_.finish(); }
+
+ private:
+  template <class T, class V>
+  void number(V value) {
+    const T raw = static_cast<T>(value);
+    bytes_.append((4 - bytes_.size() % sizeof raw + sizeof raw) % sizeof raw, '\0');
+    bytes_.append(reinterpret_cast<const char*>(&raw), sizeof raw);
+  }
+  BagTopic tf_{"/tf", "tf2_msgs/msg/TFMessage", MessageWire::kCdr,
+               *MessageSchema::known("tf2_msgs/msg/TFMessage")};
+  Topics topics_{"f", "a bag"};
+  std::string bytes_;
+};
+
+TEST(Frames, OdometryIsCorrectedByTheLocaliserOrWarnedOf) {
+  const Placed wheel = {"base_link", "a_wheel", 0.2, 0}, robot = {"odom", "base_link", 1, 0};
+  Transforms alone, corrected;
+  for (int t = 0; t < 4; ++t) {
+    alone.add(t, {wheel, robot, {"map", "odom", 5, 0}});
+    corrected.add(t, {wheel, robot});
+    if (t == 1) corrected.add(t, {{"map", "odom", 5, 0}});
+    if (t == 2) corrected.add(t, {{"map", "odom", 5, std::numbers::pi / 2}});
+  }
+  // A constant place of the odometry's frame corrects nothing.
+  const LogMap odometry = guess_map({alone.finish()});
+  EXPECT_EQ(odometry.poses.source, "/tf:base_link");
+  EXPECT_THAT(odometry.notes, ElementsAre(HasSubstr("poses are odometry (f /tf:base_link)")));
+  const Recording recording = corrected.finish();
+  const LogMap map = guess_map({recording});
+  EXPECT_EQ(map.poses.source, "/tf:map:base_link");
+  EXPECT_TRUE(map.notes.empty());
+  const LogTable& poses = recording.tables.back();
+  const auto x = poses.find("transform.translation.x"), y = poses.find("transform.translation.y");
+  ASSERT_EQ(poses.rows(), 3u);  // from the first correction on
+  EXPECT_NEAR(poses.at(0, *x), 6, 1e-12);
+  EXPECT_NEAR(poses.at(1, *x), 5, 1e-12);
+  EXPECT_NEAR(poses.at(1, *y), 1, 1e-12);
+}
+
+TEST(Frames, OdometryTopicsInTheWorldAreNoOdometry) {
+  const auto notes = [](const std::string& frame) {
+    LogTable table{"f", "/state", "nav_msgs/Odometry", {"t", "x", "y", "yaw"}, {0, 1, 2, 3}};
+    table.frame = frame;
+    return guess_map({{"f", "a bag", {table}, "", {}}}).notes.size();
+  };
+  EXPECT_EQ(notes("odom"), 1u);
+  EXPECT_EQ(notes(""), 1u);
+  EXPECT_EQ(notes("map"), 0u);
+  EXPECT_EQ(notes("ground_truth"), 0u);
+}
 
 // A file that broke off anywhere is an error with its place; nothing is half-read.
 // Of six by six numbers those of x, y and the turn about z are columns.
