@@ -16,8 +16,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kClocksApart_s = 11;  // as diagnoses allow delays, both ways
-constexpr double kThousand = 300;      // milliseconds for seconds, whatever else differs
+constexpr double kThousand = 300;  // milliseconds for seconds, whatever else differs
 constexpr std::size_t kRowsAlike = 10;
 
 // A session and a run in it.
@@ -160,7 +159,7 @@ std::string name_of(const RunKey& key) {
 
 }  // namespace
 
-Status check_times(const LoggedRun& run, const std::string& where) {
+Status check_times(const LoggedRun& run, const std::string& where, double apart_s) {
   if (run.commands.empty() || run.poses.empty()) return {};
   const double a = run.commands.front().t_s, b = run.commands.back().t_s;
   const double c = run.poses.front().t_s, d = run.poses.back().t_s;
@@ -169,7 +168,7 @@ Status check_times(const LoggedRun& run, const std::string& where) {
     return one_s > kThousand * other_s && rows < kRowsAlike * others && others < kRowsAlike * rows;
   };
   const std::size_t rows = run.commands.size(), poses = run.poses.size();
-  const bool apart = c > b + kClocksApart_s || d < a - kClocksApart_s;
+  const bool apart = c > b + apart_s || d < a - apart_s;
   const bool unit = longer(b - a, rows, d - c, poses) || longer(d - c, poses, b - a, rows);
   if (!apart && !(unit && rows > 2 && poses > 2)) return {};
   const auto span = [](double from, double end) {

@@ -22,9 +22,10 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
                          std::span<const std::string> channels);
 
 // Whether a run's poses and commands are of one clock, in one unit of time, as far as one can see:
-// apart by more than what delays may be, or one of them a thousandfold, they are not.  `where`: the
-// file, for the error.
-Status check_times(const LoggedRun& run, const std::string& where);
+// apart by more than `apart_s`, or one of them a thousandfold, they are not.  `where`: the file,
+// for the error.
+constexpr double kClocksApart_s = 11;  // as diagnoses allow delays, both ways
+Status check_times(const LoggedRun& run, const std::string& where, double apart_s = kClocksApart_s);
 
 // wheels.csv: measured wheel speeds (rad/s) of the log's runs, a column a wheel.  Runs that it does
 // not have keep none.  Errors: as read_runs(); other wheels than the log has already.

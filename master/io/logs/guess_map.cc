@@ -169,7 +169,8 @@ class Guess {
     const auto stamps = numbers(table, stamp), times = numbers(table, "t");
     const bool near = stamps.size() == times.size() && !times.empty() &&
                       std::abs(stamps.back() - times.back()) < kNearClocks_s &&
-                      std::abs(stamps.front() - times.front()) < kNearClocks_s;
+                      std::abs(stamps.front() - times.front()) < kNearClocks_s &&
+                      stamps.front() <= times.back() && times.front() <= stamps.back();
     return near ? stamp : time;
   }
 

@@ -70,8 +70,12 @@ class Importer {
       if (tally.set_back || tally.back > tally.taken) return out_of_order(kind, tally);
     }
     assemble();
-    for (const LoggedRun& logged : out_.log.runs) {
-      RETURN_IF_ERROR(check_times(logged, recordings_.front().file));
+    // A run or two may be short beside what the clocks differ by; a command or two hold on.
+    const bool shared = std::ranges::any_of(out_.log.runs, [](const LoggedRun& one) {
+      return one.commands.size() < 3 || check_times(one, "", 0);
+    });
+    for (const LoggedRun& one : out_.log.runs) {
+      RETURN_IF_ERROR(check_times(one, recordings_.front().file, shared ? kClocksApart_s : 0));
     }
     shift_clocks();
     report();

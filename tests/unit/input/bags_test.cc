@@ -132,6 +132,20 @@ TEST(Frames, OdometryIsCorrectedByTheLocaliserOrWarnedOf) {
   EXPECT_NEAR(poses.at(1, *y), 1, 1e-12);
 }
 
+TEST(Stamps, ThatShareNoMomentWithTheRecorderAreNotTaken) {
+  const auto time = [](double ahead_s) {
+    const LogTable table{"f",
+                         "/pose",
+                         "geometry_msgs/PoseStamped",
+                         {"t", "header.stamp", "x", "y", "yaw"},
+                         {0, ahead_s, 1, 2, 3, 30, 30 + ahead_s, 1, 2, 3}};
+    return guess_map({{"f", "a bag", {table}, "", {}}}).poses.find("t")->column;
+  };
+  EXPECT_EQ(time(20), "header.stamp");
+  EXPECT_EQ(time(40), "t");
+  EXPECT_EQ(time(-40), "t");
+}
+
 TEST(Frames, OdometryTopicsInTheWorldAreNoOdometry) {
   const auto notes = [](const std::string& frame) {
     LogTable table{"f", "/state", "nav_msgs/Odometry", {"t", "x", "y", "yaw"}, {0, 1, 2, 3}};

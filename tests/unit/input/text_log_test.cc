@@ -157,6 +157,12 @@ TEST(TextLogs, PosesOnAnotherClockAreRefused) {
   const Read r = read({kTwists, "t,x,y,theta\n1600000010,1,2,0.5\n1600000011,1.1,2,0.6\n"});
   ASSERT_FALSE(r.runs);
   EXPECT_THAT(r.runs.error().message, HasSubstr("expected one clock"));
+  // Apart by less than a delay may be, and yet no command was seen to do anything.
+  const std::string poses = "t,x,y,theta\n10.3,1,2,0.5\n10.4,1.1,2,0.6\n";
+  EXPECT_TRUE(read({kTwists, poses}).runs);
+  const Read apart = read({kTwists + "10.2,0,0\n", poses});
+  ASSERT_FALSE(apart.runs);
+  EXPECT_THAT(apart.runs.error().message, HasSubstr("from 10.30 to 10.40 s and its commands from"));
 }
 
 // y is up: the floor's y is -z, and a turn about y is a heading.
