@@ -1,3 +1,4 @@
+#include <boost/crc.hpp>
 #include <cstring>
 #include <map>
 
@@ -114,7 +115,7 @@ class McapReader {
     if (nested_) return broken(at);
     cursor.take(16);  // first and last time
     const auto size = cursor.number<std::uint64_t>();
-    cursor.take(4);  // checksum
+    const auto checksum = cursor.number<std::uint32_t>();
     const std::string how(cursor.text());
     const std::string_view packed = cursor.take(cursor.number<std::uint64_t>());
     if (!cursor.good()) return broken(at);
@@ -122,6 +123,12 @@ class McapReader {
     if (!plain) {
       return Error{file_ + ":" + std::to_string(at + 1) + ": " + plain.error().message + "; " +
                    kRecover};
+    }
+    boost::crc_32_type found;
+    found.process_bytes(plain->data(), plain->size());
+    if (checksum != 0 && checksum != found.checksum()) {
+      return error(at, "a chunk whose bytes do not add up to its checksum", "those recorded",
+                   kRecover);
     }
     nested_ = true;
     Cursor inner(*plain);

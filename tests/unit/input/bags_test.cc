@@ -4,12 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <boost/crc.hpp>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <numbers>
 
 #include "common/trials/files.h"
 #include "master/io/logs/decompress.h"
+#include "master/io/logs/mcap_writer.h"
 #include "master/io/logs/message.h"
 #include "master/io/logs/to_runs.h"
 #include "master/io/logs/topics.h"
@@ -194,6 +197,27 @@ TEST(BrokenBags, AreErrorsWithTheirPlace) {
     }
     // Cut between two records of its own a bag is a shorter bag; an MCAP file lacks its footer.
     EXPECT_LE(fine, bag ? 3u : 2u) << name;
+  }
+}
+
+TEST(BrokenBags, ChunksAreHeldAgainstTheirChecksums) {
+  McapWriter writer;
+  writer.add_message(writer.add_channel("/a", "A", "{}"), 1, "{}");
+  std::string file = writer.finish();
+  std::uint64_t at = 8, length = 0;  // of the chunk's record
+  for (; file[at] != 6; at += 9 + length) std::memcpy(&length, &file[at + 1], 8);
+  std::memcpy(&length, &file[at + 1], 8);
+  boost::crc_32_type crc;
+  crc.process_bytes(&file[at + 9 + 40], length - 40);
+  for (const auto& [checksum, fine] : {std::pair<std::uint32_t, bool>{0, true},
+                                       {crc.checksum(), true},
+                                       {crc.checksum() + 1, false}}) {
+    std::memcpy(&file[at + 9 + 24], &checksum, 4);
+    MemorySource source(file);
+    const auto read = read_mcap(source, "f");
+    ASSERT_EQ(read.ok(), fine);
+    if (fine) continue;
+    EXPECT_THAT(read.error().message, HasSubstr("f:" + std::to_string(at + 1) + ": found a chunk"));
   }
 }
 
