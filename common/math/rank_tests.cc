@@ -107,10 +107,10 @@ RankTest friedman(const std::vector<std::vector<double>>& values) {
 }
 
 Interval median_interval(std::span<const double> values, double coverage) {
-  assert(!values.empty());
+  const std::size_t n = values.size();
+  if (1 - 2 * std::pow(0.5, n) < coverage) return {NAN, NAN};
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
-  const std::size_t n = sorted.size();
   // [j, n - 1 - j] holds the median unless j or fewer values lie on one side of it.
   std::size_t j = 0;
   while (j + 1 < n - 1 - j &&

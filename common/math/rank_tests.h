@@ -24,7 +24,7 @@ RankTest mann_whitney(std::span<const double> a, std::span<const double> b);
 RankTest friedman(const std::vector<std::vector<double>>& values);
 
 // Distribution-free interval of the median between two order statistics, of the least coverage that
-// reaches `coverage`; the whole range when none does.  REQUIRES: not empty.
+// reaches `coverage`; NaN when none does: of five values not even all cover 95 %.
 Interval median_interval(std::span<const double> values, double coverage);
 
 // Wilson's score interval (1927) of a share.  REQUIRES: successes <= trials.

@@ -60,6 +60,7 @@ Result<Inputs> read_inputs(const CompareCommand& command) {
       inputs.variants.push_back({std::filesystem::path(file).stem().string(), std::move(config)});
     }
   }
+  name_apart(inputs.variants);
   inputs.options.seeds = command.seeds.value_or(inputs.options.seeds);
   inputs.options.first_seed = command.first_seed.value_or(inputs.options.first_seed);
   inputs.options.evaluations = command.evaluations.value_or(inputs.options.evaluations);

@@ -159,4 +159,14 @@ CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
   };
 }
 
+void name_apart(std::vector<Variant>& variants) {
+  std::map<std::string, int> named, seen;
+  for (const Variant& variant : variants) ++named[variant.name];
+  for (Variant& variant : variants) {
+    if (named[variant.name] > 1) variant.name = variant.config.path;
+    const int times = ++seen[variant.name];
+    if (times > 1) variant.name += " (" + std::to_string(times) + ")";
+  }
+}
+
 }  // namespace gapfarm

@@ -40,6 +40,9 @@ struct CompareRequest {
 using CompareScorer =
     std::function<Result<std::vector<Score>>(std::span<const CompareRequest> requests)>;
 
+// Variants of one name get their config's path instead; those of one path are numbered.
+void name_apart(std::vector<Variant>& variants);
+
 // Runs all of them in step, so that a farm always has work.  Every run of a variant is the run that
 // `evolve` would make with that seed, but for its stop conditions.  `on_round` gets how many
 // evaluations of all are done.  Errors: of the optimisers' setup and of the scorer.

@@ -100,6 +100,7 @@ void add_ranks(const std::vector<std::vector<double>>& blocks, ComparisonSummary
 }
 
 std::string range_text(double lower, double upper) {
+  if (std::isnan(lower)) return "–";
   return number_text(lower) + " to " + number_text(upper);
 }
 
@@ -271,8 +272,11 @@ std::string comparison_text(const ComparisonSummary& summary) {
   if (summary.target) text += fmt::format("  {:>9}  {:>9}  {:>9}", "success", "median to", "ERT");
   text += "\n";
   for (const VariantSummary& v : summary.variants) {
-    text += fmt::format("{:<{}}  {:>10.4g}  {:>22}  {:>5.2f}", v.name, width, v.median,
-                        fmt::format("{:.4g} to {:.4g}", v.median_95.lower, v.median_95.upper),
+    const std::string range =
+        std::isnan(v.median_95.lower)
+            ? "-"
+            : fmt::format("{:.4g} to {:.4g}", v.median_95.lower, v.median_95.upper);
+    text += fmt::format("{:<{}}  {:>10.4g}  {:>22}  {:>5.2f}", v.name, width, v.median, range,
                         v.mean_rank);
     if (summary.target) {
       const auto whole = [](const std::optional<double>& value) {
@@ -340,9 +344,10 @@ std::string convergence_csv(const ComparisonSummary& summary) {
   for (const VariantSummary& v : summary.variants) {
     for (const ConvergencePoint& point : v.convergence) {
       if (!point.median) continue;
-      text += fmt::format("{},{},{},{},{},{},{}\n", csv_field(v.name), point.evaluations,
-                          *point.median, point.median_95.lower, point.median_95.upper,
-                          point.quartiles.lower, point.quartiles.upper);
+      text +=
+          fmt::format("{},{},{},{},{},{},{}\n", csv_field(v.name), point.evaluations, *point.median,
+                      number(point.median_95.lower), number(point.median_95.upper),
+                      point.quartiles.lower, point.quartiles.upper);
     }
   }
   return text;

@@ -16,6 +16,7 @@ std::string distance_text(double distance_m) {
 }
 
 std::string interval_text(const Interval& interval) {
+  if (std::isnan(interval.lower)) return "-";
   return distance_text(interval.lower) + " to " + distance_text(interval.upper);
 }
 
@@ -43,8 +44,9 @@ std::vector<ChartBar> bars_of(const InfluenceReport& report, const ParameterTabl
     const Interval& interval = morris ? factor.morris.mean_95 : factor.alone.distance_95;
     const double value = morris ? factor.morris.mean : factor.alone.distance;
     if (value >= 1e5) continue;  // no bar is that long
-    bars.push_back({table[factor.gene.row].key, value, interval.lower,
-                    std::min(interval.upper, 1e5),
+    const bool known = std::isfinite(interval.lower);
+    bars.push_back({table[factor.gene.row].key, value, known ? interval.lower : value,
+                    known ? std::min(interval.upper, 1e5) : value,
                     morris ? factor.morris.influential : factor.alone.influential});
   }
   std::ranges::stable_sort(bars,

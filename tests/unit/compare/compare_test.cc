@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "common/base/ranges.h"
 #include "common/config/config.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
@@ -80,6 +81,17 @@ TEST(Compare, RunsAreThoseOfEvolve) {
     EXPECT_LE(alone->best().standing.cost, run.improvements.back().fitness);
     EXPECT_NEAR(alone->best().standing.cost, run.improvements.back().fitness, 1e-2);
   }
+}
+
+TEST(Compare, VariantsOfOneNameAreNamedByTheirPaths) {
+  std::vector<Variant> variants;
+  for (const char* path : {"p/a.toml", "q/a.toml", "q/a.toml", "b.toml"}) {
+    variants.push_back(variant(path[2] == 'a' ? "a" : "b", ""));
+    variants.back().config.path = path;
+  }
+  name_apart(variants);
+  EXPECT_THAT(mapped(variants, [](const Variant& v) { return v.name; }),
+              testing::ElementsAre("p/a.toml", "q/a.toml", "q/a.toml (2)", "b"));
 }
 
 TEST(Compare, ASpaceWithoutAnythingNewEndsARun) {

@@ -81,9 +81,10 @@ TEST(MedianInterval, UsesTheBinomialsOrderStatistics) {
   const Interval interval = median_interval(values, 0.95);  // 6th to 15th: 95.9 %
   EXPECT_EQ(interval.lower, 6);
   EXPECT_EQ(interval.upper, 15);
-  const Interval whole = median_interval(std::vector<double>{4, 1, 9}, 0.95);
+  const Interval whole = median_interval(std::vector<double>{4, 1, 9, 2, 3, 5}, 0.95);  // 96.9 %
   EXPECT_EQ(whole.lower, 1);
   EXPECT_EQ(whole.upper, 9);
+  EXPECT_TRUE(std::isnan(median_interval(std::vector<double>{4, 1, 9, 2, 3}, 0.95).lower));
 }
 
 TEST(WilsonInterval, KnownValues) {
