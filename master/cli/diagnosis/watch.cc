@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/hash.h"
+#include "common/base/natural_order.h"
 #include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
@@ -55,29 +56,6 @@ struct RobotFolder {
 bool is_run(const fs::path& folder) {
   std::error_code ignored;
   return fs::exists(folder / "commands.csv", ignored) || fs::exists(folder / "poses.csv", ignored);
-}
-
-// "run2" before "run10".
-bool comes_before(const std::string& a, const std::string& b) {
-  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!digit(a[i]) || !digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i;
-      ++j;
-      continue;
-    }
-    const auto number = [&](const std::string& text, std::size_t* at) {
-      while (*at < text.size() && text[*at] == '0') ++*at;
-      const std::size_t from = *at;
-      while (*at < text.size() && digit(text[*at])) ++*at;
-      return text.substr(from, *at - from);
-    };
-    const std::string x = number(a, &i), y = number(b, &j);
-    if (x != y) return x.size() != y.size() ? x.size() < y.size() : x < y;
-  }
-  return a.size() - i != b.size() - j ? a.size() - i < b.size() - j : a < b;
 }
 
 std::vector<std::string> folders_in(const fs::path& folder) {

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "common/base/hash.h"
+#include "common/base/natural_order.h"
 #include "common/base/result.h"
 #include "common/base/suggest.h"
 
@@ -14,6 +16,12 @@ TEST(Hash, ReportsBoundariesAndBitsApart) {
   EXPECT_EQ(content_hash("abc").size(), 32u);
   EXPECT_NE(Hasher().add("ab").add("c").finish(), Hasher().add("a").add("bc").finish());
   EXPECT_NE(Hasher().add(0.0).finish(), Hasher().add(-0.0).finish());
+}
+
+TEST(NaturalOrder, CountsNumbersAndPutsOtherLettersLast) {
+  std::vector<std::string> runs = {"über7", "run10", "rün4", "run2", "zug5"};
+  std::ranges::sort(runs, comes_before);
+  EXPECT_EQ(runs, (std::vector<std::string>{"run2", "run10", "rün4", "zug5", "über7"}));
 }
 
 TEST(Suggest, OffersTheNearestWordOnly) {
