@@ -55,6 +55,24 @@ TEST_F(GroundCommands, RunsOfTheCommandLineDoWhereTheConfigNamesNone) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/2.csv"));
 }
 
+TEST_F(GroundCommands, RunsKeepTheLettersOfTheirNames) {
+  for (const std::string file : {"/commands.csv", "/poses.csv"}) {
+    std::string text = text_of(folder_ / "monday" + file);
+    for (std::size_t at = text.find("\n1,"); at != text.npos; at = text.find("\n1,", at)) {
+      text.replace(at + 1, 1, "день");
+    }
+    for (std::size_t at = text.find("\n2,"); at != text.npos; at = text.find("\n2,", at)) {
+      text.replace(at + 1, 1, "ночь");
+    }
+    folder_.write("monday" + file, text);
+  }
+  const Finished exported = gapfarm_command(
+      {"export", "runs", config(""), "--trials", folder_ / "monday", "--out", folder_ / "out"});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/день.csv"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/ночь.csv"));
+}
+
 TEST_F(GroundCommands, TheMedianOfTwoEndsIsTheirMean) {
   const Finished exported =
       gapfarm_command({"export", "runs", config("[runs]\nfolders = [\"monday\"]\n"), "--out",

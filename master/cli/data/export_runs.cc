@@ -36,7 +36,8 @@ std::vector<ShownPoses> shown_poses(const FittedRuns& fitted) {
 std::string file_of(const std::string& run) {
   std::string name;
   for (const char c : run) {
-    name += std::isalnum(static_cast<unsigned char>(c)) || c == '-' ? c : '_';
+    const auto byte = static_cast<unsigned char>(c);
+    name += byte >= 0x80 || std::isalnum(byte) || c == '-' ? c : '_';
   }
   return (name.empty() ? "run" : name) + ".csv";
 }
