@@ -134,7 +134,12 @@ Result<int> import_runs(ImportOptions& options, CliContext& context) {
     console.result(columns_text(recordings) + map_text, {{"map", map_text}});
     return kExitDone;
   }
-  RETURN_IF_ERROR(check_map(map, recordings));
+  if (Status s = check_map(map, recordings); !s) {
+    for (const Recording& recording : recordings) {
+      for (const std::string& note : recording.notes) console.note(printable(note));
+    }
+    return s.error();
+  }
   ASSIGN_OR_RETURN(const ImportedRuns runs, to_runs(recordings, map));
   for (const std::string& line : runs.report) console.note(printable(line));
   if (runs.log.runs.empty()) {

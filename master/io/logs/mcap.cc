@@ -167,13 +167,18 @@ class McapReader {
       read.type = s.name;
       read.wire = encoding == "ros1" ? MessageWire::kRos1 : MessageWire::kCdr;
       const bool text = s.encoding == "ros1msg" || s.encoding == "ros2msg";
-      if ((encoding == "ros1" || encoding == "cdr") && text && serves_ground_robots(s.name)) {
+      const bool serves = serves_ground_robots(s.name), cdr = encoding == "cdr";
+      if ((encoding == "ros1" || cdr) && text && serves && !s.text.empty()) {
         Result<MessageSchema> parsed = MessageSchema::parse(s.name, s.text);
         if (!parsed) {
           return error(at, parsed.error().message, "a whole definition of the message", kRecover);
         }
         read.schema = *std::move(parsed);
+      } else if (cdr && serves && s.text.empty()) {
+        // rosbag2 found no definition; as in a .db3 the type's name is to do.
+        if (auto known = MessageSchema::known(s.name)) read.schema = *std::move(known);
       }
+      if (serves && !read.schema) read.type += ", " + encoding + " without a ROS definition";
     }
     if (read.type.empty()) read.type = encoding;
     channels_.emplace(id, std::move(read));

@@ -200,6 +200,34 @@ TEST(BrokenBags, AreErrorsWithTheirPlace) {
   }
 }
 
+// rosbag2 writes schemas without a text where it found no definition.
+TEST(Mcap, TypesWithoutADefinitionAreKnownByName) {
+  const auto number = [](std::uint64_t value, std::size_t bytes) {
+    return std::string(reinterpret_cast<const char*>(&value), bytes);
+  };
+  const auto text = [&](const std::string& name) { return number(name.size(), 4) + name; };
+  const auto record = [&](char op, const std::string& bytes) {
+    return op + number(bytes.size(), 8) + bytes;
+  };
+  for (const std::string encoding : {"cdr", "json"}) {
+    const std::string file =
+        "\x89MCAP0\r\n" +
+        record(3, number(1, 2) + text("geometry_msgs/msg/Twist") + text("") + text("")) +
+        record(4, number(1, 2) + number(1, 2) + text("/cmd_vel") + text(encoding) + text("")) +
+        record(5, number(1, 2) + std::string(20, 0) + number(256, 4) + std::string(48, '\0')) +
+        record(2, std::string(20, '\0'));
+    MemorySource source(file);
+    const auto read = read_mcap(source, "f");
+    ASSERT_TRUE(read) << read.error().message;
+    if (encoding == "cdr") {
+      ASSERT_EQ(read->tables.size(), 1u);
+      EXPECT_TRUE(read->tables[0].find("angular.z"));
+    } else {
+      EXPECT_THAT(read->notes, ElementsAre(HasSubstr("json without a ROS definition, 1 messages")));
+    }
+  }
+}
+
 TEST(BrokenBags, ChunksAreHeldAgainstTheirChecksums) {
   McapWriter writer;
   writer.add_message(writer.add_channel("/a", "A", "{}"), 1, "{}");
