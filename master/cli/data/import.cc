@@ -144,7 +144,7 @@ Result<int> import_runs(ImportOptions& options, CliContext& context) {
   for (const std::string& line : runs.report) console.note(printable(line));
   if (runs.log.runs.empty()) {
     return Error{options.files.front() +
-                 ":1: found no run with both poses and commands, expected one; give the files of "
+                 ":1: found no run with two poses and commands, expected one; give the files of "
                  "both, in the same order"};
   }
   RETURN_IF_ERROR(write_files(options.out, format_runs(runs.log), map_text, outputs));

@@ -294,9 +294,11 @@ class Importer {
         const std::string stem = stem_of(recordings_[group.front()].file);
         run.run = name.empty() ? stem : all.size() == 1 ? name : stem + "_" + name;
         for (char& c : run.run) c = c == ',' || static_cast<unsigned char>(c) < 0x20 ? '_' : c;
-        if (run.poses.empty() || (run.commands.empty() && !log.channels.empty())) {
+        if (run.poses.size() < 2 || (run.commands.empty() && !log.channels.empty())) {
           out_.report.push_back("left: run " + run.run + ", which has " +
-                                (run.poses.empty() ? "no poses" : "no commands"));
+                                (run.poses.empty()      ? "no poses"
+                                 : run.poses.size() < 2 ? "one pose"
+                                                        : "no commands"));
           continue;
         }
         log.runs.push_back(std::move(run));

@@ -258,6 +258,14 @@ TEST(Tables, WheelSpeedsAreReadBesideCommands) {
   EXPECT_FALSE(read_wheel_speeds(folder + "/wheels.csv", &*log));
 }
 
+TEST(Tables, RunsOfOnePoseAreOmitted) {
+  const Recording one = table_of("t,x,y,yaw,v,w\n0,0,0,0,1,0\n");
+  const auto runs = to_runs({one}, guess_map({one}));
+  ASSERT_TRUE(runs) << runs.error().message;
+  EXPECT_TRUE(runs->log.runs.empty());
+  EXPECT_THAT(runs->report, Contains(HasSubstr("left: run f, which has one pose")));
+}
+
 // Times that begin anew: one run would keep a part of them.
 TEST(Tables, RowsInNoOrderAreRefused) {
   const auto map = parse_map(
