@@ -148,6 +148,12 @@ TEST(ReportHtml, ParametersHaveIntervalsBoundsAndWhatMakesUpForWhat) {
   EXPECT_THAT(html, HasSubstr("[effects.battery_sag]\nrate = 0.0061"));
 }
 
+TEST(ReportHtml, WithoutParametersItNamesTheReason) {
+  Diagnosis diagnosis = example_diagnosis();
+  diagnosis.parameters.clear();
+  EXPECT_THAT(report_html(diagnosis), HasSubstr("None: nothing was named"));
+}
+
 TEST(Parameters, AZeroThatEndsASizeIsNoBound) {
   ParameterRow row{"drive_noise_side", "-", "", "", {}, 0, {}, {}, 0, 0.3, "", ""};
   EXPECT_EQ(bound_hit(row), BoundHit::kNone);
