@@ -73,6 +73,14 @@ TEST_F(GroundCommands, RunsKeepTheLettersOfTheirNames) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/ночь.csv"));
 }
 
+TEST_F(GroundCommands, ALogIsNoReferenceOfItself) {
+  const std::string monday = folder_ / "monday";
+  const Finished same = gapfarm_command({"diagnose", config(""), "--trials", monday, "--reference",
+                                         monday, "--out", folder_ / "out"});
+  EXPECT_EQ(same.exit_code, 2);
+  EXPECT_THAT(same.err, HasSubstr("--reference: found the log that is diagnosed"));
+}
+
 TEST_F(GroundCommands, TheMedianOfTwoEndsIsTheirMean) {
   const Finished exported =
       gapfarm_command({"export", "runs", config("[runs]\nfolders = [\"monday\"]\n"), "--out",

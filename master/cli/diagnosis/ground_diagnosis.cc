@@ -82,10 +82,13 @@ std::string log_hash(const RunLog& log) {
 Result<int> run_diagnose_runs(DiagnoseCommand& command, const Config& config,
                               const std::vector<Gene>& searched, const std::string& stamp,
                               CliContext& context) {
-  context.begun = true;
   const bool kinematic = config.problem.ground != nullptr;
   Problem problem = config.problem;
   ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, problem.channels()));
+  if (command.reference_log && log_hash(*command.reference_log) == log_hash(runs)) {
+    return Error{"--reference: found the log that is diagnosed, expected an earlier one"};
+  }
+  context.begun = true;
   RETURN_IF_ERROR(LongCommand::begin(
       "diagnose", {command.out}, {std::begin(kGroundStages), std::end(kGroundStages)}, context));
   ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
