@@ -81,6 +81,14 @@ TEST_F(GroundCommands, ALogIsNoReferenceOfItself) {
   EXPECT_THAT(same.err, HasSubstr("--reference: found the log that is diagnosed"));
 }
 
+TEST_F(GroundCommands, WatchNamesTheOneFolderOfARobotsFile) {
+  write_runs("fleet/run1", {0.2});
+  const Finished watched =
+      gapfarm_command({"watch", folder_ / "fleet", "--out", folder_ / "watched"});
+  EXPECT_EQ(watched.exit_code, 2);
+  EXPECT_THAT(watched.err, HasSubstr("put robot.toml into " + (folder_ / "fleet") + ", or name"));
+}
+
 TEST_F(GroundCommands, TheMedianOfTwoEndsIsTheirMean) {
   const Finished exported =
       gapfarm_command({"export", "runs", config("[runs]\nfolders = [\"monday\"]\n"), "--out",

@@ -98,8 +98,9 @@ Status read_robots(const WatchCommand& command, std::vector<RobotFolder>* robots
     if (file.empty()) file = robot.path / kRobotFile;
     if (!fs::exists(file, ignored)) file = fs::path(command.folder) / kRobotFile;
     if (command.robot.empty() && !fs::exists(file, ignored)) {
+      const bool one = robot.path == fs::path(command.folder);
       return Error{"found no robot file for " + robot.name + ": put robot.toml into " +
-                   command.folder + " (one for all) or " + robot.path.string() +
+                   command.folder + (one ? "" : " (one for all) or " + robot.path.string()) +
                    ", or name it with --robot"};
     }
     ASSIGN_OR_RETURN(robot.robot,
