@@ -8,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/result.h"
 #include "common/problem/problem.h"
 
 namespace gapfarm {
@@ -67,11 +66,5 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
 // The robot's file with the values put in: what may be pasted back.  What no file has a word for
 // (a battery that sags, a clock that drifts) is omitted.
 GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics);
-
-// Levenberg's and Marquardt's least squares on the problem's windows, Huber's weights beyond two
-// robust standard deviations: of the short windows, then of all.  The delay is found first, by a
-// scan of +-1 s round the file's.  What is a magnitude stays at 0 or above.
-// Errors: no windows.
-Result<Kinematics> fit_kinematics(const Problem& problem);
 
 }  // namespace gapfarm

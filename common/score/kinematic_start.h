@@ -9,10 +9,7 @@
 namespace gapfarm {
 
 // The problem's values with those of its genes that the robot's own kinematics show (radii, sizes,
-// clock, lag, marker, steering), fitted to its windows by least squares and kept within the genes'
-// ranges.  The problem's own where it has no ground robot or no windows.
-ParameterValues kinematic_start(const Problem& problem);
-// The same of kinematics that were fitted before.
+// clock, lag, marker, steering) as fitted and kept within the genes' ranges.
 ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted);
 
 // `values` with those of the problem's genes that let wheels slip (friction, creep, drag, loads)

@@ -5,8 +5,8 @@
 #include <unordered_map>
 
 #include "common/base/try.h"
-#include "common/score/kinematic_start.h"
 #include "master/evolve/islands.h"
+#include "master/ground/fit/kinematic_baseline.h"
 
 namespace gapfarm {
 namespace {

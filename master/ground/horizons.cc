@@ -16,6 +16,7 @@
 #include "common/recordings/windows.h"
 #include "common/score/fitness.h"
 #include "common/trials/text/csv.h"
+#include "master/ground/fit/kinematic_baseline.h"
 
 namespace gapfarm {
 namespace {

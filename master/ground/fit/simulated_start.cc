@@ -9,6 +9,7 @@
 #include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/score/kinematic_start.h"
+#include "master/ground/fit/kinematic_baseline.h"
 #include "master/ground/fit/simulation_fit.h"
 
 namespace gapfarm {

@@ -63,7 +63,7 @@ WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
       memo_(memo) {
   if (memo != nullptr) question_ = question_of(robot, windows, reference);
   if (is_throttled(robot)) {
-    shape_by_speed();
+    if (windows.by_speed) shape_by_speed();
   } else if (!windows.noise.empty()) {
     shapes_ = noise_shapes(windows.least_noise);
   }

@@ -47,6 +47,7 @@ struct WindowSet {
   std::vector<double> turned_rad;  // of each trial by the gyro, its bias in; empty: there is none
   std::vector<Return> returns;
   Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();  // the middle of where trials begin
+  bool by_speed = true;  // of throttled robots: ends err along their way above all
   // The trials' measured ends as a simulation expects them, at each of some values; empty: as the
   // robot's kinematics do.
   std::function<std::vector<std::vector<Pose>>(const std::vector<Kinematics>&)> simulated = {};

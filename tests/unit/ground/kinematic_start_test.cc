@@ -6,6 +6,7 @@
 
 #include "common/random/stream.h"
 #include "common/score/kinematic.h"
+#include "master/ground/fit/kinematic_baseline.h"
 #include "tests/unit/worker/ground_problem.h"
 #include "worker/sim/robot/ground.h"
 
@@ -123,6 +124,62 @@ TEST(KinematicStart, NothingSlipsWithoutSlip) {
   EXPECT_EQ(values[problem.table().row("creep")], 0.1);
   EXPECT_EQ(values[problem.table().row("friction_ratio")],
             problem.values[problem.table().row("friction_ratio")]);
+}
+
+// A differential drive that hardly slips does what its kinematics say.
+TEST(KinematicBaseline, IsFittedToWindows) {
+  Problem problem;
+  problem.scenario = "ground";
+  problem.commands = default_commands("ground");
+  ASSERT_TRUE(problem
+                  .set_robot("drive = \"differential\"\ncommands = [\"left\", \"right\"]\n"
+                             "wheel_separation = 0.3\nlag = 0.1\n[wheels.left]\nradius = 0.05\n"
+                             "[wheels.right]\nradius = 0.05\n",
+                             "diff.toml")
+                  .ok());
+  ParameterValues truth = problem.values;
+  const auto set = [&](const char* key, double v) { truth[problem.table().row(key)] = v; };
+  set("wheels.right.radius", 0.052);
+  set("wheel_separation", 0.33);
+  set("delay", 0.22);
+  set("marker.y", 0.03);
+  tests::take_runs(problem, {tests::driven_run(problem, truth, 60)});
+  const auto fit = fit_kinematics(problem);
+  ASSERT_TRUE(fit.ok()) << fit.error().message;
+  const auto value = [&](const char* name) {
+    const auto found = std::find(fit->names.begin(), fit->names.end(), name);
+    return fit->values[found - fit->names.begin()];
+  };
+  EXPECT_NEAR(value("right"), 1.04, 0.004);
+  EXPECT_NEAR(value("separation"), 1.1, 0.01);
+  EXPECT_NEAR(value("delay"), 0.22, 0.01);
+  EXPECT_NEAR(value("marker_y"), 0.03, 0.003);
+  const std::vector<Pose> ends = kinematic_ends(problem, *fit);
+  double squares = 0;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const Pose& measured = problem.log.trials[i].X_WE;
+    squares += std::pow(std::hypot(ends[i].x - measured.x, ends[i].y - measured.y), 2);
+  }
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(ends.size())), 2e-3);
+}
+
+// A lag slows down by its size: a negative one is none.
+TEST(KinematicBaseline, HasNoNegativeLag) {
+  for (const double lag_s : {0.0, 0.01}) {
+    Problem problem = tests::ground_problem();
+    ParameterValues truth = problem.values;
+    truth[problem.table().row("lag")] = lag_s;
+    for (const double earlier_s : {0.0, 0.03}) {
+      LoggedRun run = tests::driven_run(problem, truth, 20);
+      for (PoseRow& pose : run.poses) pose.t_s -= earlier_s;
+      tests::take_runs(problem, {run}, {{0.5, 2}, 0.5});
+      const auto fit = fit_kinematics(problem);
+      ASSERT_TRUE(fit.ok()) << fit.error().message;
+      const auto found = std::find(fit->names.begin(), fit->names.end(), "lag");
+      EXPECT_GE(fit->values[found - fit->names.begin()], 0) << lag_s << " " << earlier_s;
+      EXPECT_LT(fit->values[found - fit->names.begin()], 0.05) << lag_s << " " << earlier_s;
+    }
+  }
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // Scenario `ground` from a problem's bytes to its fitness.
 #include <gtest/gtest.h>
 
-#include "common/score/kinematic.h"
 #include "tests/unit/worker/ground_problem.h"
 #include "worker/evaluate.h"
 
@@ -125,62 +124,6 @@ TEST(GroundScenario, RowsComeFromTheRobot) {
   EXPECT_EQ(*robot.wheel("front_right")->radius_m, 0.12);
   // The controller still believes what its file says.
   EXPECT_EQ(*robot.controller.wheel_separation_m, 0.4);
-}
-
-// A differential drive that hardly slips does what its kinematics say.
-TEST(GroundScenario, KinematicsAreFittedToWindows) {
-  Problem problem;
-  problem.scenario = "ground";
-  problem.commands = default_commands("ground");
-  ASSERT_TRUE(problem
-                  .set_robot("drive = \"differential\"\ncommands = [\"left\", \"right\"]\n"
-                             "wheel_separation = 0.3\nlag = 0.1\n[wheels.left]\nradius = 0.05\n"
-                             "[wheels.right]\nradius = 0.05\n",
-                             "diff.toml")
-                  .ok());
-  ParameterValues truth = problem.values;
-  const auto set = [&](const char* key, double v) { truth[problem.table().row(key)] = v; };
-  set("wheels.right.radius", 0.052);
-  set("wheel_separation", 0.33);
-  set("delay", 0.22);
-  set("marker.y", 0.03);
-  take_runs(problem, {driven_run(problem, truth, 60)});
-  const auto fit = fit_kinematics(problem);
-  ASSERT_TRUE(fit.ok()) << fit.error().message;
-  const auto value = [&](const char* name) {
-    const auto found = std::find(fit->names.begin(), fit->names.end(), name);
-    return fit->values[found - fit->names.begin()];
-  };
-  EXPECT_NEAR(value("right"), 1.04, 0.004);
-  EXPECT_NEAR(value("separation"), 1.1, 0.01);
-  EXPECT_NEAR(value("delay"), 0.22, 0.01);
-  EXPECT_NEAR(value("marker_y"), 0.03, 0.003);
-  const std::vector<Pose> ends = kinematic_ends(problem, *fit);
-  double squares = 0;
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    const Pose& measured = problem.log.trials[i].X_WE;
-    squares += std::pow(std::hypot(ends[i].x - measured.x, ends[i].y - measured.y), 2);
-  }
-  EXPECT_LT(std::sqrt(squares / static_cast<double>(ends.size())), 2e-3);
-}
-
-// A lag slows down by its size: a negative one is none.
-TEST(GroundScenario, FittedKinematicsHaveNoNegativeLag) {
-  for (const double lag_s : {0.0, 0.01}) {
-    Problem problem = ground_problem();
-    ParameterValues truth = problem.values;
-    truth[problem.table().row("lag")] = lag_s;
-    for (const double earlier_s : {0.0, 0.03}) {
-      LoggedRun run = driven_run(problem, truth, 20);
-      for (PoseRow& pose : run.poses) pose.t_s -= earlier_s;
-      take_runs(problem, {run}, {{0.5, 2}, 0.5});
-      const auto fit = fit_kinematics(problem);
-      ASSERT_TRUE(fit.ok()) << fit.error().message;
-      const auto found = std::find(fit->names.begin(), fit->names.end(), "lag");
-      EXPECT_GE(fit->values[found - fit->names.begin()], 0) << lag_s << " " << earlier_s;
-      EXPECT_LT(fit->values[found - fit->names.begin()], 0.05) << lag_s << " " << earlier_s;
-    }
-  }
 }
 
 }  // namespace gapfarm::worker_ground_test

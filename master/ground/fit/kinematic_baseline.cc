@@ -1,0 +1,84 @@
+#include "master/ground/fit/kinematic_baseline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "common/base/ranges.h"
+#include "common/score/kinematic_start.h"
+#include "master/ground/fit/scans.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kShort = 4;  // times the shortest window
+// How far off a value may be, of gains, m, s, rad: far more than windows leave.
+constexpr double kFreely = 1;
+
+std::vector<FitRow> baseline_rows(const GroundRobot& robot) {
+  const Kinematics nominal = nominal_kinematics(robot);
+  std::vector<FitRow> rows;
+  for (KinematicRow& row : kinematic_rows(robot)) {
+    if (nominal.index(row.name) < 0) continue;
+    row.farthest = kFreely;
+    rows.push_back({std::move(row), true});
+  }
+  return rows;
+}
+
+double duration_of(const Trial& trial) { return trial.duration_s.value_or(0); }
+
+// Those of the problem's windows that are at most `most` times as long as its shortest.
+WindowSet windows_of(const Problem& problem, double most = INFINITY) {
+  WindowSet set;
+  set.runs = problem.runs;
+  set.by_speed = false;
+  const double shortest_s =
+      duration_of(*std::ranges::min_element(problem.log.trials, {}, duration_of));
+  for (const Trial& t : problem.log.trials) {
+    if (duration_of(t) <= most * shortest_s) set.trials.push_back(t);
+  }
+  for (const std::size_t length : window_lengths(mapped(set.trials, duration_of))) {
+    set.horizon.push_back(static_cast<int>(length));
+  }
+  set.horizons = set.lengths = std::ranges::max(set.horizon) + 1;
+  return set;
+}
+
+}  // namespace
+
+Result<Kinematics> fit_kinematics(const Problem& problem) {
+  if (problem.log.trials.empty() || !problem.ground) {
+    return Error{"kinematics need windows of logged runs, but there are none"};
+  }
+  const GroundRobot& robot = problem.ground->robot();
+  const std::vector<FitRow> rows = baseline_rows(robot);
+  // Over long windows a robot turns so far with a file's wrong values that headings are wrong by
+  // whole turns: what the short ones say is where the fit to all begins.
+  const WindowSet some = windows_of(problem, kShort), all = windows_of(problem);
+  const WindowFitter first(robot, some), last(robot, all);
+  Kinematics fitted;
+  fitted.values = first.fit(rows, {}, scan_delay(first, rows, nominals(rows))).values;
+  fitted.values = last.fit(rows, {}, fitted.values).values;
+  for (const FitRow& row : rows) fitted.names.push_back(row.row.name);
+  return fitted;
+}
+
+ParameterValues kinematic_start(const Problem& problem) {
+  const auto fitted = fit_kinematics(problem);
+  return fitted ? kinematic_start(problem, *fitted) : problem.values;
+}
+
+WindowEnds kinematic_held_out(const Problem& problem, const Kinematics& fitted,
+                              const RobustErrors& errors, std::span<const std::size_t> stretches) {
+  const GroundRobot& robot = problem.ground->robot();
+  const WindowSet windows = windows_of(problem);
+  const WindowFitter fitter(robot, windows);
+  const std::vector<FitRow> rows = baseline_rows(robot);
+  const WindowFit fit = fitter.hold(rows, fitted.values);
+  const NormalEquations freely{fitter.prior_precision(rows),
+                               Eigen::VectorXd::Zero(fitted.values.size())};
+  return held_out_ends(errors, fit.residuals, fitter.slopes(fit), freely, stretches);
+}
+
+}  // namespace gapfarm
