@@ -58,6 +58,18 @@ TEST(WhatChanged, ReportsNothingOfAFileThatIsWrongWhereNothingChanged) {
   EXPECT_TRUE(again.diagnosis.effects.empty()) << again.diagnosis.headline;
 }
 
+// Three of its tolerances for the whole log are hardly more than a clock loses; in every window
+// they are most of what it misses by.
+TEST(WhatChanged, NamesADelayThatClosesTheGap) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const GroundDiagnosis later =
+      changed(robot, driven(robot, off_by({"delay"}, {0.05})),
+              driven(robot, off_by({"delay"}, {0.05 + 3.2 * kDelay_s}), 5));
+  ASSERT_EQ(later.diagnosis.effects.size(), 1u) << later.diagnosis.headline;
+  EXPECT_EQ(later.diagnosis.effects.front().name, "command_delay");
+  EXPECT_NEAR(later.diagnosis.effects.front().parameters.at(0).value, 3.2 * kDelay_s, 2e-3);
+}
+
 TEST(WhatChanged, ReportsAnotherFloorFromOtherSteering) {
   const GroundRobot car = robot_of(kCar);
   const RunLog before = driven(car, cars_own(7));

@@ -170,5 +170,13 @@ TEST(WrongFile, AnAccelerationLimitThatTheRobotHasNotIsNamed) {
   EXPECT_EQ(found.diagnosis.effects.front().name, "acceleration_limit");
 }
 
+TEST(WrongFile, AnAccelerationLimitThatTheFileHasNotIsNamed) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const GroundDiagnosis found = checked(robot, driven(robot, off_by({"ramp"}, {2})), "no limit");
+  ASSERT_EQ(found.diagnosis.effects.size(), 1u) << found.diagnosis.headline;
+  EXPECT_EQ(found.diagnosis.effects.front().name, "acceleration_limit");
+  EXPECT_NEAR(found.diagnosis.effects.front().parameters.at(0).value, 2, 0.05);
+}
+
 }  // namespace
 }  // namespace gapfarm
