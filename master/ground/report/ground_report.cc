@@ -212,9 +212,9 @@ void GroundReport::judge() {
   const std::string moved = values_that_would_move(search_);
   if (nothing_is_left(figures_)) {
     if (search_.reference && d_.gap.final_ > kToleratedGap) {
-      d_.findings.push_back(
-          "What gap there is closes where values move as they do from log to log" +
-          (moved.empty() ? "." : ": " + moved + "."));
+      d_.findings.insert(d_.findings.begin(),
+                         "What gap there is closes where values move as they do from log to log" +
+                             (moved.empty() ? "." : ": " + moved + "."));
     }
     return;
   }
