@@ -292,7 +292,10 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
   search->free_fit = fitter.fit(all, {}, search->fit.values);
   WindowFit moved = fit_held_out(fitter, search->fit.rows, search->fit.values);
   const WindowFit named = search->chain.back();
-  const WindowFit& before = search->reference && !moved_far(fitter, search->fit) ? moved : named;
+  // They may move, and need not.
+  const bool within =
+      search->reference && !moved_far(fitter, search->fit) && mean(moved.nats) > mean(named.nats);
+  const WindowFit& before = within ? moved : named;
   WindowFit best = before;
   std::swap(best, search->best);
   std::string what = "what is named";
