@@ -58,6 +58,8 @@ bool is_run(const fs::path& folder) {
   return fs::exists(folder / "commands.csv", ignored) || fs::exists(folder / "poses.csv", ignored);
 }
 
+double begin_of(const RunFolder& run) { return run.log.runs.front().poses.front().t_s; }
+
 std::vector<std::string> folders_in(const fs::path& folder) {
   std::vector<std::string> names;
   std::error_code ignored;
@@ -149,12 +151,12 @@ void read_logs(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
       run.log = std::move(*log);
       return false;
     });
-    const auto begin = [](const RunFolder& run) { return run.log.runs.front().poses.front().t_s; };
     const bool dated = std::ranges::all_of(
-        robot.runs, [&](const RunFolder& run) { return begin(run) > kEpoch_s; });
+        robot.runs, [](const RunFolder& run) { return begin_of(run) > kEpoch_s; });
     if (dated) {  // runs at one time stay by name
-      std::ranges::stable_sort(
-          robot.runs, [&](const RunFolder& a, const RunFolder& b) { return begin(a) < begin(b); });
+      std::ranges::stable_sort(robot.runs, [](const RunFolder& a, const RunFolder& b) {
+        return begin_of(a) < begin_of(b);
+      });
     }
   }
 }
@@ -171,9 +173,10 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
   std::map<std::string, std::string> seen;  // logs, and whose they are
   for (const RobotFolder& robot : *robots) all += robot.runs.size();
   for (RobotFolder& robot : *robots) {
-    WatchedRobot& to = fleet->robots.emplace_back(WatchedRobot{robot.name, {}, {}});
+    WatchedRobot& to = fleet->robots.emplace_back(WatchedRobot{robot.name, {}, {}, {}});
     for (RunFolder& run : robot.runs) {
       ++done;
+      const double begin_s = begin_of(run);
       if (context.stop.requested()) return Error{"stopped", ErrorCode::kStopped};
       const auto [first, fresh] = seen.try_emplace(log_hash(run.log), robot.name + "/" + run.name);
       if (!fresh) {  // copied, or linked
@@ -198,11 +201,23 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
       }
       to.runs.push_back(run.name);
       to.fits.push_back(**fit);
+      to.times_s.push_back(begin_s);
     }
   }
   context.console.clear_progress();
   std::erase_if(fleet->robots, [](const WatchedRobot& robot) { return robot.runs.empty(); });
   return {};
+}
+
+// Of each robot's runs, where all are dates that rise; else none.
+std::vector<std::vector<double>> dates_of(const WatchedFleet& fleet) {
+  std::vector<std::vector<double>> times = mapped(fleet.robots, &WatchedRobot::times_s);
+  const bool dated = std::ranges::all_of(times, [](const std::vector<double>& of_robot) {
+    return of_robot.front() > kEpoch_s &&
+           std::ranges::adjacent_find(of_robot, std::greater_equal<>()) == of_robot.end();
+  });
+  if (!dated) times.clear();
+  return times;
 }
 
 Result<int> run_watch(WatchCommand& command, CliContext& context) {
@@ -236,8 +251,8 @@ Result<int> run_watch(WatchCommand& command, CliContext& context) {
     return Error{command.folder + ": no run could be fitted"};
   }
   fleet.rows = watched_rows(robots.front().robot);
-  const FleetChanges changes =
-      find_changes(fleet.rows, mapped(fleet.robots, &WatchedRobot::fits), command.seed);
+  const FleetChanges changes = find_changes(fleet.rows, mapped(fleet.robots, &WatchedRobot::fits),
+                                            command.seed, dates_of(fleet));
   const Json json = watch_json(fleet, changes);
   RETURN_IF_ERROR(command.outputs.write_in(
       command.out,

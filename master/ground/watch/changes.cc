@@ -10,6 +10,7 @@
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
+#include "master/ground/watch/describe_steps.h"
 #include "master/ground/watch/fleet_steps.h"
 #include "master/ground/watch/mixed_model.h"
 #include "master/infer/certificate.h"
@@ -21,16 +22,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kWarmRounds = 4;   // from values nearby
-constexpr int kNullDraws = 400;  // of each kind
-constexpr double kCovered = 0.9;
+constexpr int kWarmRounds = 4;       // from values nearby
+constexpr int kNullDraws = 400;      // of each kind
 constexpr double kOddWeight = 0.25;  // of a run that is off by itself
 
-VectorXd tolerances_of(const WatchedRows& rows) {
-  return vector_of(rows.rows, &KinematicRow::tolerance);
-}
-
-ScaledFleet scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots) {
+ScaledFleet scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots,
+                   const std::vector<std::vector<double>>& times) {
   const VectorXd per = tolerances_of(rows).cwiseInverse();
   ScaledFleet fleet;
   fleet.owned = rows.owned.cwiseProduct(per).cwiseAbs2();
@@ -44,6 +41,14 @@ ScaledFleet scaled(const WatchedRows& rows, const std::vector<std::vector<Offset
       to.covariances.emplace_back(per.asDiagonal() * run.covariance * per.asDiagonal());
     }
     to.weights.assign(runs.size(), 1);
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      std::size_t moment = times.empty() ? i : 0;
+      for (const std::vector<double>& of_robot : times) {
+        moment += static_cast<std::size_t>(std::ranges::count_if(
+            of_robot, [&](double t) { return t < times[fleet.robots.size() - 1][i]; }));
+      }
+      to.moments.push_back(moment);
+    }
   }
   return fleet;
 }
@@ -68,10 +73,6 @@ OddRobot farthest_robot(const ScaledFleet& fleet, const std::vector<RobotFit>& f
     }
   }
   return best;
-}
-
-std::vector<RobotFit> fit_robots(const ScaledFleet& fleet, const RunVariances& variances) {
-  return mapped(fleet.robots, [&](const RobotRuns& robot) { return fit_robot(robot, variances); });
 }
 
 // Runs of robots without changes: normal ones, with the covariances and variances of these; or
@@ -179,99 +180,18 @@ WatchThresholds thresholds_of(ScaledFleet fleet, RunVariances variances, std::ui
   return most;
 }
 
-// The smallest span of runs that holds these shares' 90 % best.
-std::pair<std::size_t, std::size_t> span_of(const std::vector<double>& shares) {
-  std::vector<std::size_t> order(shares.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return shares[a] > shares[b]; });
-  std::pair<std::size_t, std::size_t> span = {order[0], order[0]};
-  double held = 0;
-  for (const std::size_t i : order) {
-    span = {std::min(span.first, i), std::max(span.second, i)};
-    held += shares[i];
-    if (held >= kCovered) break;
-  }
-  return span;
-}
-
-// A step by its posterior over values and onsets, all equally likely before and its size normal
-// round nothing; the robot's other steps are in the fit.
-ValueStep describe_step(const WatchedRows& rows, const ScaledFleet& fleet,
-                        const RunVariances& variances, const StepCandidate& found) {
-  const RobotRuns& robot = fleet.robots[found.robot];
-  const auto scores = score_steps(fit_robot(robot, variances), robot, fleet.directions);
-  std::vector<std::vector<double>> weights(scores.size());
-  double all = 0;
-  ValueStep step;
-  step.robot = found.robot;
-  for (std::size_t k = 0; k < scores.size(); ++k) {
-    double sum = 0;
-    for (const StepScore& s : scores[k]) {
-      const double known = s.precision * rows.values[k].plausible * rows.values[k].plausible;
-      const double nats =
-          s.statistic() * known / (1 + known) / 2 - std::log1p(known) / 2 - found.statistic / 2;
-      weights[k].push_back(s.precision > 0 ? std::exp(nats) : 0);
-      sum += weights[k].back();
-    }
-    step.shares.push_back(sum);
-    all += sum;
-  }
-  for (double& share : step.shares) share /= all;
-  step.value = static_cast<std::size_t>(std::max_element(step.shares.begin(), step.shares.end()) -
-                                        step.shares.begin());
-  std::vector<double>& onsets = weights[step.value];
-  for (double& w : onsets) w /= all * step.shares[step.value];
-  double squares = 0;
-  for (std::size_t i = 0; i < onsets.size(); ++i) {
-    const StepScore& s = scores[step.value][i];
-    if (onsets[i] <= 0) continue;
-    step.change += onsets[i] * s.change;
-    squares += onsets[i] * (s.change * s.change + 1 / s.precision);
-    step.statistic = std::max(step.statistic, s.statistic());
-  }
-  step.onset = static_cast<std::size_t>(std::ranges::max_element(onsets) - onsets.begin());
-  std::tie(step.onset_first, step.onset_last) = span_of(onsets);
-  const double half = kNormal90 * std::sqrt(std::max(0.0, squares - step.change * step.change));
-  step.lo = step.change - half;
-  step.hi = step.change + half;
-  return step;
-}
-
-// Steps as all that was found describes them, each beside the others.
-std::vector<ValueStep> describe_steps(const WatchedRows& rows, const ScaledFleet& fleet,
-                                      const RunVariances& variances,
-                                      const std::vector<StepCandidate>& found) {
-  std::vector<ValueStep> steps;
-  for (std::size_t s = 0; s < found.size(); ++s) {
-    ScaledFleet without = fleet;
-    for (RobotRuns& robot : without.robots) robot.steps.clear();
-    for (std::size_t t = 0; t < found.size(); ++t) {
-      if (t != s) add_step(found[t], &without);
-    }
-    steps.push_back(describe_step(rows, without, variances, found[s]));
-  }
-  std::stable_sort(steps.begin(), steps.end(), [](const ValueStep& a, const ValueStep& b) {
-    return std::pair(a.robot, a.onset) < std::pair(b.robot, b.onset);
-  });
-  return steps;
-}
-
 std::vector<std::vector<RunReading>> readings_of(const WatchedRows& rows, const ScaledFleet& fleet,
                                                  const RobotFit& fit, const VectorXd& owned) {
   std::vector<std::vector<RunReading>> readings;
   const Index p = owned.size(), q = fit.beta.size();
-  const VectorXd away = owned - vector_of(rows.rows, &KinematicRow::nominal);
   for (std::size_t k = 0; k < fleet.directions.size(); ++k) {
     const VectorXd& d = fleet.directions[k];
-    const VectorXd& among = rows.values[k].direction;
     auto& of_value = readings.emplace_back();
     for (std::size_t i = 0; i < fit.precisions.size(); ++i) {
       const double precision = d.dot(fit.precisions[i] * d);
       const VectorXd off =
           fit.residuals[i] + fit.designs[i].rightCols(q - p) * fit.beta.tail(q - p);
-      of_value.push_back({rows.values[k].nominal + among.dot(away) / among.squaredNorm() +
-                              d.dot(fit.precisions[i] * off) / precision,
+      of_value.push_back({value_at(rows, k, owned) + d.dot(fit.precisions[i] * off) / precision,
                           1 / std::sqrt(precision)});
     }
   }
@@ -295,8 +215,9 @@ std::vector<std::vector<double>> detectable_of(const ScaledFleet& fleet, RobotRu
 }  // namespace
 
 FleetChanges find_changes(const WatchedRows& rows,
-                          const std::vector<std::vector<OffsetFit>>& robots, std::uint64_t seed) {
-  ScaledFleet fleet = scaled(rows, robots);
+                          const std::vector<std::vector<OffsetFit>>& robots, std::uint64_t seed,
+                          const std::vector<std::vector<double>>& times) {
+  ScaledFleet fleet = scaled(rows, robots, times);
   const Index p = fleet.owned.size();
   RunVariances variances{1, VectorXd::Ones(p)};
   estimate_variances(&fleet.robots, &variances, kEstimateRounds);

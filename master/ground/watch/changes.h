@@ -21,6 +21,7 @@ struct WatchedValue {
   std::string unit;           // "-": a ratio to the robot's file
   double nominal = 0;         // in the robot's file
   double plausible = 0;       // standard deviation of what it may change by
+  double least = 0;           // below it the value has no meaning
   Eigen::VectorXd direction;  // among the rows
 };
 
@@ -34,11 +35,11 @@ WatchedRows watched_rows(const GroundRobot& robot);
 
 // `lo` to `hi`: 90 % intervals.
 struct ValueStep {
-  std::size_t robot = 0;
-  std::size_t value = 0;  // among WatchedRows::values
-  std::size_t onset = 0;  // its first run
+  std::vector<std::size_t> robots;  // several: one step of them all at one moment
+  std::size_t value = 0;            // among WatchedRows::values
+  std::size_t onset = 0;            // its first run, of the first of the robots
   std::size_t onset_first = 0, onset_last = 0;
-  double change = 0, lo = 0, hi = 0;  // in the value's unit
+  double change = 0, lo = 0, hi = 0;  // in the value's unit; where that is "-", ratios to what was
   double statistic = 0;               // likelihood ratio, twice its logarithm
   std::vector<double> shares;         // posterior probability of each of the values
 };
@@ -92,7 +93,9 @@ inline constexpr double kMostFalseAlarms = 0.05;
 
 // Runs of each robot in their order.  Steps have three runs before and behind them at least; a
 // single run that is off is an odd run.  Robots are held against one another from three on.
+// `times`: of each robot's runs, by one clock; none: the runs of one number are of one time.
 FleetChanges find_changes(const WatchedRows& rows,
-                          const std::vector<std::vector<OffsetFit>>& robots, std::uint64_t seed);
+                          const std::vector<std::vector<OffsetFit>>& robots, std::uint64_t seed,
+                          const std::vector<std::vector<double>>& times = {});
 
 }  // namespace gapfarm

@@ -22,22 +22,72 @@ std::vector<std::size_t> lengths_of(std::size_t runs) {
 std::vector<StepCandidate> steps_in(const ScaledFleet& fleet, const RunVariances& variances) {
   std::vector<StepCandidate> best(fleet.directions.size());
   for (std::size_t k = 0; k < best.size(); ++k) best[k].value = k;
+  std::vector<std::vector<std::vector<StepScore>>> stay;
+  std::vector<std::size_t> all;
   for (std::size_t u = 0; u < fleet.robots.size(); ++u) {
-    const RobotFit fit = fit_robot(fleet.robots[u], variances);
+    const RobotRuns& robot = fleet.robots[u];
+    const RobotFit fit = fit_robot(robot, variances);
+    all.push_back(u);
     for (const std::size_t length : lengths_of(fit.residuals.size())) {
-      const auto scores = score_steps(fit, fleet.robots[u], fleet.directions, length);
+      auto scores = score_steps(fit, robot, fleet.directions, length);
       for (std::size_t k = 0; k < scores.size(); ++k) {
         for (std::size_t i = 0; i < scores[k].size(); ++i) {
           const double statistic = scores[k][i].statistic();
-          if (statistic > best[k].statistic) best[k] = {u, k, i, statistic, length};
+          if (statistic > best[k].statistic)
+            best[k] = {{u}, k, robot.moments[i], statistic, length};
         }
       }
+      if (length == 0) stay.push_back(std::move(scores));
+    }
+  }
+  const PooledScores pooled = pool_scores(fleet, all, stay);
+  for (std::size_t k = 0; k < best.size(); ++k) {
+    for (std::size_t m = 0; m < pooled.moments.size(); ++m) {
+      StepCandidate step{{}, k, pooled.moments[m], pooled.scores[k][m].statistic()};
+      if (all.size() == 1 || step.statistic <= best[k].statistic) continue;
+      for (const std::size_t u : all) {
+        const std::size_t run = run_from(fleet.robots[u], step.moment);
+        if (run < stay[u][k].size() && stay[u][k][run].precision > 0) step.robots.push_back(u);
+      }
+      best[k] = std::move(step);
     }
   }
   return best;
 }
 
 }  // namespace
+
+std::size_t run_from(const RobotRuns& robot, std::size_t moment) {
+  return static_cast<std::size_t>(std::ranges::lower_bound(robot.moments, moment) -
+                                  robot.moments.begin());
+}
+
+PooledScores pool_scores(const ScaledFleet& fleet, const std::vector<std::size_t>& robots,
+                         const std::vector<std::vector<std::vector<StepScore>>>& of_robots) {
+  PooledScores pooled;
+  for (const std::size_t u : robots) {
+    const std::vector<std::size_t>& moments = fleet.robots[u].moments;
+    pooled.moments.insert(pooled.moments.end(), moments.begin(), moments.end());
+  }
+  std::ranges::sort(pooled.moments);
+  pooled.moments.erase(std::unique(pooled.moments.begin(), pooled.moments.end()),
+                       pooled.moments.end());
+  pooled.scores.assign(fleet.directions.size(), std::vector<StepScore>(pooled.moments.size()));
+  for (const std::size_t u : robots) {
+    for (std::size_t m = 0; m < pooled.moments.size(); ++m) {
+      const std::size_t run = run_from(fleet.robots[u], pooled.moments[m]);
+      for (std::size_t k = 0; k < pooled.scores.size(); ++k) {
+        if (run >= of_robots[u][k].size()) continue;
+        const StepScore& own = of_robots[u][k][run];
+        StepScore& sum = pooled.scores[k][m];
+        sum.precision += own.precision;
+        if (own.precision > 0)
+          sum.change += (own.change - sum.change) * own.precision / sum.precision;
+      }
+    }
+  }
+  return pooled;
+}
 
 StepCandidate best_of(const std::vector<StepCandidate>& steps,
                       const std::vector<double>& thresholds) {
@@ -50,19 +100,23 @@ StepCandidate best_of(const std::vector<StepCandidate>& steps,
 
 void add_step(const StepCandidate& step, ScaledFleet* fleet) {
   const Eigen::VectorXd& direction = fleet->directions[step.value];
-  std::vector<StepColumn>& steps = fleet->robots[step.robot].steps;
-  steps.push_back({step.onset, direction});
-  if (step.length > 0) steps.push_back({step.onset + step.length, direction});
+  for (const std::size_t u : step.robots) {
+    RobotRuns& robot = fleet->robots[u];
+    const std::size_t onset = run_from(robot, step.moment);
+    robot.steps.push_back({onset, direction});
+    if (step.length > 0) robot.steps.push_back({onset + step.length, direction});
+  }
 }
 
 std::vector<StepCandidate> best_steps(ScaledFleet* fleet, int rounds, RunVariances* variances) {
   const StepCandidate first = best_of(steps_in(*fleet, *variances));
   if (first.statistic > 0) {
-    std::vector<StepColumn>& steps = fleet->robots[first.robot].steps;
-    const std::size_t before = steps.size();
     add_step(first, fleet);
     estimate_variances(&fleet->robots, variances, rounds);
-    steps.resize(before);
+    for (const std::size_t u : first.robots) {
+      std::vector<StepColumn>& steps = fleet->robots[u].steps;
+      steps.resize(steps.size() - (first.length > 0 ? 2 : 1));
+    }
   }
   return steps_in(*fleet, *variances);
 }
@@ -74,10 +128,7 @@ std::vector<StepCandidate> add_steps_beyond(const std::vector<double>& threshold
     const StepCandidate step = best_of(best_steps(fleet, kEstimateRounds, variances), thresholds);
     if (step.statistic <= thresholds[step.value]) break;
     add_step(step, fleet);
-    found.push_back({step.robot, step.value, step.onset, step.statistic});
-    if (step.length > 0) {
-      found.push_back({step.robot, step.value, step.onset + step.length, step.statistic});
-    }
+    found.push_back(step);
   }
   return found;
 }

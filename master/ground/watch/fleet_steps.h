@@ -11,8 +11,10 @@ namespace gapfarm {
 
 inline constexpr int kEstimateRounds = 40;  // of EM, from the priors
 
+// At one moment in one robot, or of one size in all that have runs enough on either side.
 struct StepCandidate {
-  std::size_t robot = 0, value = 0, onset = 0;
+  std::vector<std::size_t> robots;
+  std::size_t value = 0, moment = 0;
   double statistic = 0;
   std::size_t length = 0;  // runs, after which it is back; 0: it stays
 };
@@ -23,6 +25,17 @@ struct ScaledFleet {
   std::vector<Eigen::VectorXd> directions;
   Eigen::VectorXd owned;  // variances
 };
+
+// Scores of steps of one size in these robots, [value][moment].
+struct PooledScores {
+  std::vector<std::size_t> moments;  // at which one of them has a run
+  std::vector<std::vector<StepScore>> scores;
+};
+// `of_robots`: scores of each robot's steps, [robot][value][run].
+PooledScores pool_scores(const ScaledFleet& fleet, const std::vector<std::size_t>& robots,
+                         const std::vector<std::vector<std::vector<StepScore>>>& of_robots);
+// The first run from a moment on.
+std::size_t run_from(const RobotRuns& robot, std::size_t moment);
 
 // Of steps in each value the one that is farthest beyond its threshold; none: all are 0.
 StepCandidate best_of(const std::vector<StepCandidate>& steps,
@@ -36,7 +49,6 @@ void add_step(const StepCandidate& step, ScaledFleet* fleet);
 std::vector<StepCandidate> best_steps(ScaledFleet* fleet, int rounds, RunVariances* variances);
 
 // Steps beyond the thresholds, each sought beside the ones before; they are left in the fleet.
-// What is back counts as two that stay.
 std::vector<StepCandidate> add_steps_beyond(const std::vector<double>& thresholds,
                                             ScaledFleet* fleet, RunVariances* variances);
 

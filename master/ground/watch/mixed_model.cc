@@ -31,6 +31,13 @@ MatrixXd variance_of(const MatrixXd& covariance, const RunVariances& variances) 
   return V;
 }
 
+bool lies_near_step(const RobotRuns& robot, const VectorXd& direction, std::size_t run) {
+  return std::ranges::any_of(robot.steps, [&](const StepColumn& step) {
+    return step.direction == direction &&
+           std::max(run, step.onset) < std::min(run, step.onset) + kLeastRuns;
+  });
+}
+
 }  // namespace
 
 RobotFit fit_robot(const RobotRuns& robot, const RunVariances& variances) {
@@ -108,6 +115,8 @@ std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const Robot
     if (n - i < kLeastRuns + length || i < kLeastRuns) continue;
     for (std::size_t k = 0; k < directions.size(); ++k) {
       const VectorXd& d = directions[k];
+      if (lies_near_step(robot, d, i) || (length > 0 && lies_near_step(robot, d, i + length)))
+        continue;
       const VectorXd taken = shared * d;
       const double alone = d.dot(weight * d);
       const double precision = alone - taken.dot(fit.covariance * taken);

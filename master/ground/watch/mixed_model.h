@@ -17,6 +17,8 @@ struct RobotRuns {
   std::vector<Eigen::MatrixXd> covariances;
   std::vector<double> weights = {};  // of each run: runs that are far off count little
   std::vector<StepColumn> steps = {};
+  std::vector<std::size_t> moments =
+      {};  // of each run, ascending: its place among all robots' runs
 };
 
 struct RunVariances {
@@ -47,7 +49,8 @@ struct StepScore {
   double precision = 0;  // of the change
   double statistic() const { return change * change * precision; }
 };
-// [direction][onset]; nothing (precision 0) where fewer than kLeastRuns runs lie on a side.
+// [direction][onset]; nothing (precision 0) where fewer than kLeastRuns runs lie on a side, or
+// between it and another of the robot's steps in this direction.
 std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const RobotRuns& robot,
                                                 const std::vector<Eigen::VectorXd>& directions,
                                                 std::size_t length = 0);

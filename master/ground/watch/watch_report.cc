@@ -23,6 +23,13 @@ std::string change_text(const WatchedValue& value, double change, double lo, dou
   return fmt::format("{:+.4g} [{:+.4g}, {:+.4g}] {}", change, lo, hi, value.unit);
 }
 
+std::string names_of(const WatchedFleet& fleet, const std::vector<std::size_t>& robots) {
+  if (robots.size() > 1 && robots.size() == fleet.robots.size()) return "all robots";
+  std::string names;
+  for (const std::size_t u : robots) names += (names.empty() ? "" : ", ") + fleet.robots[u].name;
+  return names;
+}
+
 // Of one finding: robot, since when, between which runs, what, by how much, how sure.
 using Line = std::vector<std::string>;
 const Line kHead = {"robot", "since run", "within runs", "what", "by (90 %)", "chance"};
@@ -30,14 +37,14 @@ const Line kHead = {"robot", "since run", "within runs", "what", "by (90 %)", "c
 std::vector<Line> finding_lines(const WatchedFleet& fleet, const FleetChanges& changes) {
   std::vector<Line> lines;
   for (const ValueStep& step : changes.steps) {
-    const WatchedRobot& robot = fleet.robots[step.robot];
+    const WatchedRobot& robot = fleet.robots[step.robots.front()];
     const WatchedValue& value = fleet.rows.values[step.value];
     std::string what = value.thing;
     for (std::size_t k = 0; k < step.shares.size(); ++k) {
       if (k == step.value || step.shares[k] < kShownShare) continue;
       what += fmt::format("; or {} ({:.0f} %)", fleet.rows.values[k].thing, 100 * step.shares[k]);
     }
-    lines.push_back({robot.name, robot.runs[step.onset],
+    lines.push_back({names_of(fleet, step.robots), robot.runs[step.onset],
                      robot.runs[step.onset_first] + " to " + robot.runs[step.onset_last], what,
                      change_text(value, step.change, step.lo, step.hi),
                      fmt::format("{:.0f} %", 100 * step.shares[step.value])});
@@ -94,9 +101,10 @@ LineChart value_chart(const WatchedFleet& fleet, const FleetChanges& changes, st
     const auto& readings = changes.readings[u][value];
     for (std::size_t i = 0; i < readings.size(); ++i) {
       const double run = static_cast<double>(i + 1), half = kNormal90 * readings[i].deviation;
-      series.line.push_back({run, readings[i].value});
-      series.lower.push_back({run, readings[i].value - half});
-      series.upper.push_back({run, readings[i].value + half});
+      const auto meant = [&](double of) { return std::max(of, watched.least); };
+      series.line.push_back({run, meant(readings[i].value)});
+      series.lower.push_back({run, meant(readings[i].value - half)});
+      series.upper.push_back({run, meant(readings[i].value + half)});
     }
     chart.series.push_back(std::move(series));
   }
@@ -114,7 +122,7 @@ std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& chan
   for (const ValueStep& step : changes.steps) {
     if (most == nullptr || step.statistic > most->statistic) most = &step;
   }
-  if (most != nullptr) return run_name(fleet, most->robot, most->onset);
+  if (most != nullptr) return run_name(fleet, most->robots.front(), most->onset);
   if (!changes.odd_robots.empty()) return run_name(fleet, changes.odd_robots.front().robot, 0);
   if (changes.odd_runs.empty()) return "";
   return run_name(fleet, changes.odd_runs.front().robot, changes.odd_runs.front().run);
@@ -154,8 +162,9 @@ Json value_json(const WatchedFleet& fleet, std::size_t robot, std::size_t value)
 Json steps_json(const WatchedFleet& fleet, const FleetChanges& changes) {
   Json steps = Json::array();
   for (const ValueStep& step : changes.steps) {
-    const std::vector<std::string>& runs = fleet.robots[step.robot].runs;
-    Json json = value_json(fleet, step.robot, step.value);
+    const std::vector<std::string>& runs = fleet.robots[step.robots.front()].runs;
+    Json json = value_json(fleet, step.robots.front(), step.value);
+    for (const std::size_t u : step.robots) json["robots"].push_back(fleet.robots[u].name);
     json.update({{"onset", runs[step.onset]},
                  {"onset_first", runs[step.onset_first]},
                  {"onset_last", runs[step.onset_last]},

@@ -13,6 +13,7 @@ struct WatchedRobot {
   std::string name;
   std::vector<std::string> runs;  // their names, in order
   std::vector<OffsetFit> fits;
+  std::vector<double> times_s;  // at which runs begin
 };
 
 struct WatchedSkip {

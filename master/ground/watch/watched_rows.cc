@@ -30,8 +30,8 @@ WatchedRows watched_rows(const GroundRobot& robot) {
   catalogue.insert(catalogue.end(), changes.begin(), changes.end());
   const auto add = [&](const GroundHypothesis& h, const KinematicRow& row,
                        Eigen::VectorXd direction) {
-    watched.values.push_back(
-        {h.name, row.name, h.thing, row.unit, row.nominal, plausible_error(row), direction});
+    watched.values.push_back({h.name, row.name, h.thing, row.unit, row.nominal,
+                              plausible_error(row), least_value(row), direction});
   };
   for (Eigen::Index k = 0; k < p; ++k) {
     const KinematicRow& row = watched.rows[static_cast<std::size_t>(k)];
