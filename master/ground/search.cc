@@ -303,6 +303,9 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
   if (!best.nats.empty()) keep_if_best(search, std::move(best), std::move(what));
   keep_if_best(search, moved, "small moves of all values");
   keep_if_best(search, fit_held_out(fitter, all, search->free_fit.values), "every value free");
+  if (search->smooth) {
+    keep_if_best(search, search->smooth->held_out, "a correction by " + search->smooth->depends_on);
+  }
   search->closable = held_out_gain(search->windows, search->best, before, work.seed);
 }
 
@@ -327,6 +330,7 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   while (search.steps.size() < kMostSteps && take_step(fitter, work, &search)) {
   }
   if (!(work.stopped && work.stopped())) drop_again(fitter, work, unnamed, &search);
+  if (!(work.stopped && work.stopped())) drop_stand_ins(fitter, work, unnamed, &search);
   if (work.stopped && work.stopped()) return stopped;
   emit_steps(work, search);
   stage(kRestStage);

@@ -18,6 +18,7 @@
 #include "master/ground/fit/held_out.h"
 #include "master/ground/fit/wheel_loop.h"
 #include "master/ground/fit/window_fit.h"
+#include "master/ground/free_residual.h"
 #include "master/ground/hypotheses.h"
 #include "master/io/log_checks/run_checks.h"
 
@@ -113,7 +114,10 @@ struct GroundSearch : GroundBasis, GroundNames {
   WindowFit best;
   std::string best_of_all;  // "floor_edge"
   HeldOutGain closable;
-  double unexplained = 0;  // share_unexplained() by the best
+  // What still foresees more than is tolerated, for sure, beside what is named; of no change.
+  std::optional<FreeResidual> smooth;
+  std::vector<std::size_t> stand_ins;  // hypotheses that it foresees as much without
+  double unexplained = 0;              // share_unexplained() by the best
 };
 
 struct GroundFault : FoundFault {

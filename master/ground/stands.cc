@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "master/ground/report/ground_text.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
@@ -75,28 +76,71 @@ GroundNames with_names(const WindowFitter& fitter, const GroundWork& work,
   return again;
 }
 
-}  // namespace
+// Where the log is sure that it closes more than is tolerated: robots that nobody touched have a
+// little of it.
+std::optional<FreeResidual> sure_correction(const WindowFitter& fitter, const GroundWork& work,
+                                            const WindowFit& held_out) {
+  std::optional<FreeResidual> smooth = fit_free_residual(fitter, held_out);
+  if (!smooth) return {};
+  const HeldOutGain gain = held_out_gain(fitter.windows(), smooth->held_out, held_out, work.seed);
+  return gain.lo > kToleratedGap ? smooth : std::nullopt;
+}
 
-void drop_again(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
-                GroundSearch* search) {
-  for (std::size_t k = 0; search->steps.size() > 1 && k < search->steps.size();) {
-    const auto at = static_cast<std::ptrdiff_t>(k);
+// Takes away names that do not stand, one after the other: `stands` says so of each, beside what
+// the search has without it.
+template <class Stands>
+void drop_where_not(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
+                    GroundSearch* search, Stands stands) {
+  for (std::size_t k = 0; k < search->steps.size();) {
     std::vector<GroundStep> steps = search->steps;
-    steps.erase(steps.begin() + at);
+    steps.erase(steps.begin() + static_cast<std::ptrdiff_t>(k));
     GroundNames others = with_names(fitter, work, *search, unnamed, steps);
-    const GroundStep& step = search->steps[k];
-    const HeldOutGain gain =
-        held_out_gain(search->windows, search->chain.back(), others.chain.back(), work.seed);
-    if (may_be_named(gain) && may_be_named(step.held_out) &&
-        shows_its_size(fitter, work, *search, step.chosen, search->fit)) {
+    if (stands(search->steps[k], others)) {
       ++k;
       continue;
     }
     others.offers = search->offers;
-    others.offers.erase(others.offers.begin() + at);
+    others.offers.erase(others.offers.begin() + static_cast<std::ptrdiff_t>(steps.empty() ? 1 : k));
     static_cast<GroundNames&>(*search) = std::move(others);
     k = 0;
   }
+}
+
+}  // namespace
+
+void drop_again(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
+                GroundSearch* search) {
+  const auto stands = [&](const GroundStep& step, const GroundNames& others) {
+    const HeldOutGain gain =
+        held_out_gain(search->windows, search->chain.back(), others.chain.back(), work.seed);
+    return others.steps.empty() ||
+           (may_be_named(gain) && may_be_named(step.held_out) &&
+            shows_its_size(fitter, work, *search, step.chosen, search->fit));
+  };
+  drop_where_not(fitter, work, unnamed, search, stands);
+}
+
+void drop_stand_ins(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
+                    GroundSearch* search) {
+  if (search->reference) return;  // what both logs have is no change
+  search->smooth = sure_correction(fitter, work, search->chain.back());
+  if (!search->smooth) return;
+  const auto gain = [&](const WindowFit& with, const WindowFit& without) {
+    return held_out_gain(search->windows, with, without, work.seed);
+  };
+  const auto stands = [&](const GroundStep& step, const GroundNames& others) {
+    auto without = sure_correction(fitter, work, others.chain.back());
+    if (!without) return true;
+    // Of what acts in the world a correction by place says the same in more numbers.
+    if (without->of_world && search->catalogue[step.chosen].of_world) return true;
+    const HeldOutGain alone = gain(search->chain.back(), others.chain.back());
+    const HeldOutGain beside = gain(search->smooth->held_out, without->held_out);
+    if (may_be_named(beside) && beside.mean >= kTraceShare * alone.mean) return true;
+    search->stand_ins.push_back(step.chosen);
+    search->smooth = std::move(without);
+    return false;
+  };
+  drop_where_not(fitter, work, unnamed, search, stands);
 }
 
 }  // namespace gapfarm

@@ -21,4 +21,9 @@ WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,
 void drop_again(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
                 GroundSearch* search);
 
+// Looks for a smooth correction (GroundSearch::smooth) beside what is named; names beside which it
+// foresees hardly more than it does without them stand for something else, and lose them.
+void drop_stand_ins(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
+                    GroundSearch* search);
+
 }  // namespace gapfarm

@@ -333,6 +333,14 @@ std::vector<ResidualShape> residual_shapes(bool free_commands) {
   };
   add(F::kRobot, true, {"duration", "level"}, alike(2, {0.35, 1}));
   add(F::kWorld, true, {"duration", "level"}, alike(2, {0.35, 1}));
+  if (free_commands) {
+    // What sets in at some speed: a threshold, a limit.
+    for (const Names side : {Names{"left"}, Names{"right"}}) {
+      shapes.push_back(
+          {F::kRobot, false, false, false, rows_of_covariates(side), alike(1, {0.05, 0.15})});
+    }
+    add(F::kMotion, false, {"left", "right"}, alike(2, {0.35, 1}));
+  }
   add(F::kRobot, true, {"heading"}, alike(1, {0.6, 1.2}));
   add(F::kRobot, true, {"x", "y"}, alike(2, {0.35, 1}));
   add(F::kRobot, true, {"time"}, alike(1, {0.35, 1}));

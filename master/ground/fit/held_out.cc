@@ -19,21 +19,6 @@ std::vector<std::pair<int, int>> blocks_of_runs(const WindowSet& windows) {
   });
 }
 
-// Of every block, the fold that it is held out with.  What a run has of its own, such as its
-// clock's offset, is held out together where there are runs enough.
-std::vector<int> folds_of(const WindowSet& windows) {
-  std::vector<int> folds(windows.blocks);
-  const auto runs = blocks_of_runs(windows);
-  const bool whole = runs.size() >= kLeastRunsHeldOut;
-  for (std::size_t b = 0; b < folds.size(); ++b) folds[b] = static_cast<int>(b) % kFolds;
-  for (std::size_t r = 0; whole && r < runs.size(); ++r) {
-    for (int k = 0; k < runs[r].second; ++k) {
-      folds[runs[r].first + k] = static_cast<int>(r) % kFolds;
-    }
-  }
-  return folds;
-}
-
 // Of every block.
 std::vector<double> block_gains(const WindowSet& windows, const WindowFit& with,
                                 const WindowFit& without) {
@@ -57,6 +42,19 @@ HeldOutGain with_interval(double mean, std::vector<double> drawn) {
 
 }  // namespace
 
+std::vector<int> held_out_folds(const WindowSet& windows) {
+  std::vector<int> folds(windows.blocks);
+  const auto runs = blocks_of_runs(windows);
+  const bool whole = runs.size() >= kLeastRunsHeldOut;
+  for (std::size_t b = 0; b < folds.size(); ++b) folds[b] = static_cast<int>(b) % kFolds;
+  for (std::size_t r = 0; whole && r < runs.size(); ++r) {
+    for (int k = 0; k < runs[r].second; ++k) {
+      folds[runs[r].first + k] = static_cast<int>(r) % kFolds;
+    }
+  }
+  return folds;
+}
+
 Interval ninety_percent_of(std::vector<double> drawn) {
   std::sort(drawn.begin(), drawn.end());
   const std::size_t tail = drawn.size() / 20;
@@ -66,7 +64,7 @@ Interval ninety_percent_of(std::vector<double> drawn) {
 std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
                                          const std::vector<FitRow>& rows,
                                          const Eigen::VectorXd& start) {
-  const std::vector<int> folds = folds_of(fitter.windows());
+  const std::vector<int> folds = held_out_folds(fitter.windows());
   std::vector<WindowFit> parts;
   for (int fold = 0; fold < kFolds; ++fold) {
     std::vector<char> out(folds.size(), 0);
@@ -78,7 +76,7 @@ std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
 
 WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                        const Eigen::VectorXd& start) {
-  const std::vector<int> folds = folds_of(fitter.windows());
+  const std::vector<int> folds = held_out_folds(fitter.windows());
   const std::vector<WindowFit> parts = fit_without_folds(fitter, rows, start);
   WindowFit whole = fitter.hold(rows, start);
   for (std::size_t i = 0; i < whole.nats.size(); ++i) {
@@ -88,6 +86,21 @@ WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& ro
     whole.residuals[i] = part.residuals[i];
   }
   return whole;
+}
+
+WindowFit judge_held_out(const WindowFitter& fitter, WindowFit fit,
+                         const std::vector<Eigen::Vector3d>& raw) {
+  const std::vector<int> folds = held_out_folds(fitter.windows());
+  WindowFit judged = fitter.judge(fit, raw);
+  for (int fold = 0; fold < kFolds; ++fold) {
+    std::vector<char> out(folds.size(), 0);
+    for (std::size_t b = 0; b < folds.size(); ++b) out[b] = folds[b] == fold;
+    const WindowFit part = fitter.judge(fit, raw, out);
+    for (std::size_t i = 0; i < part.nats.size(); ++i) {
+      if (out[fitter.windows().block[i]]) judged.nats[i] = part.nats[i];
+    }
+  }
+  return judged;
 }
 
 std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint64_t seed,

@@ -12,6 +12,10 @@
 
 namespace gapfarm {
 
+// Of every block, the fold that it is held out with.  What a run has of its own, such as its
+// clock's offset, is held out together where there are runs enough.
+std::vector<int> held_out_folds(const WindowSet& windows);
+
 // The rows fitted to all but one of the folds, kFolds times; no rows: the file's values as they
 // are.
 std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
@@ -20,6 +24,11 @@ std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
 // Nats of every window by the one of these that was not fitted to it.
 WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                        const Eigen::VectorXd& start);
+
+// A fit with these residuals in place of its own (m, m, rad), those of each fold under the scales
+// of the others.
+WindowFit judge_held_out(const WindowFitter& fitter, WindowFit fit,
+                         const std::vector<Eigen::Vector3d>& raw);
 
 // How often each block of a log counts, draw by draw.  Of n runs n less `spared` are drawn (of
 // values one is spared, so that the scatter of few is not taken for small), and of each as many

@@ -348,6 +348,22 @@ WindowFit WindowFitter::hold(const std::vector<FitRow>& rows, const Eigen::Vecto
   return standing(rows, {values, {}}, uses(held_out));
 }
 
+WindowFit WindowFitter::judge(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+                              const std::vector<char>& held_out) const {
+  fit.residuals = raw;
+  for (std::size_t i = 0; i < shapes_.size(); ++i) fit.residuals[i] = shapes_[i] * raw[i];
+  fit.scales.clear();
+  rescale(&fit, uses(held_out));
+  score(&fit, uses(held_out));
+  return fit;
+}
+
+Eigen::Matrix3d WindowFitter::whitener(const WindowFit& fit, std::size_t window) const {
+  const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[window])];
+  const Eigen::Matrix3d scaled = s.cwiseInverse().asDiagonal();
+  return shapes_.empty() ? scaled : Eigen::Matrix3d(scaled * shapes_[window]);
+}
+
 WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                             const Eigen::VectorXd& values, int rounds) const {
   const Eigen::VectorXd start =

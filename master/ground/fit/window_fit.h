@@ -108,6 +108,12 @@ class WindowFitter {
   WindowFit hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
                  const std::vector<char>& held_out = {}) const;
 
+  // A fit with these residuals (m, m, rad) in place of its own, scales fitted.
+  WindowFit judge(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+                  const std::vector<char>& held_out = {}) const;
+  // What makes a window's residual (m, m, rad) one in scales.
+  Eigen::Matrix3d whitener(const WindowFit& fit, std::size_t window) const;
+
   // Of every window, 3 by rows: how its residuals change with the values of a fit.
   std::vector<Eigen::MatrixXd> slopes(const WindowFit& fit) const;
   // Nats that `rows` (those of the fit first, some of them freed, then new ones that stand at

@@ -207,6 +207,7 @@ void GroundReport::judge() {
   figures_.unexplained = search_.unexplained;
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
+  if (!search_.stand_ins.empty()) d_.findings.push_back(nearest_of_catalogue(search_));
   unseen_ = values_not_shown(fitter_, search_, options_.seed);
   if (!unseen_.empty()) d_.cautions.push_back(unseen_);
   const std::string moved = values_that_would_move(search_);

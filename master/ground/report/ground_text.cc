@@ -273,6 +273,14 @@ std::string verdict_reason(const GroundFigures& figures) {
       closes, kToleratedGap);
 }
 
+std::string nearest_of_catalogue(const GroundSearch& search) {
+  return fmt::format(
+      "Of the catalogue this comes nearest: {}; but a correction by {} foresees as much without "
+      "it.",
+      joined(search.stand_ins, ", ", [&](std::size_t h) { return search.catalogue[h].name; }),
+      search.smooth->depends_on);
+}
+
 std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search,
                               const std::vector<double>& horizons_s) {
   const WindowFit& now = search.chain.back();

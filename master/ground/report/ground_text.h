@@ -69,6 +69,9 @@ Verdict ground_verdict(const GroundFigures& figures);
 // What a verdict without names rests on, one sentence.
 std::string verdict_reason(const GroundFigures& figures);
 
+// Which names stood for something else.  REQUIRES: some did.
+std::string nearest_of_catalogue(const GroundSearch& search);
+
 // One finding a component that holds a quarter of what could still be closed or more, largest
 // first: at which horizon it is largest, and from when on in the log, where one half holds it.
 std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search,

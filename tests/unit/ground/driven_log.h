@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -85,26 +86,31 @@ inline CommandRow row_at(const GroundRobot& robot, int run, int second, double p
 }
 
 // What a robot that is `truly` off its file logs: five runs on one clock, poses of 0.3 mm and
-// 1 mrad.  Runs of another `first` are reported other things.
+// 1 mrad.  Runs of another `first` are reported other things.  `motor`: what a command makes of
+// itself before kinematics see it; `seconds`: of a run.
 inline RunLog driven(const GroundRobot& robot, const Kinematics& truly, int first = 0,
-                     double push = 1) {
+                     double push = 1, const std::function<double(double)>& motor = {},
+                     int seconds = 13) {
   Stream stream({7, Purpose::kTest, static_cast<std::uint64_t>(first), 0, 0});
   RunLog log;
   log.channels = robot.channels;
   for (int r = 0; r < 5; ++r) {
-    const double began = 40.0 * r;
+    const double began = (27.0 + seconds) * r;
     LoggedRun run;
     run.run = std::to_string(r + 1);
     CommandedRun commanded;
     commanded.start_s = began;
-    for (int second = 0; second < 13; ++second) {
+    for (int second = 0; second < seconds; ++second) {
       CommandRow row = row_at(robot, first + r, second, push);
       row.t_s += began;
       run.commands.push_back(row);
     }
     commanded.commands = run.commands;
+    for (CommandRow& row : commanded.commands) {
+      for (double& value : row.values) value = motor ? motor(value) : value;
+    }
     std::vector<Trial> windows;
-    for (int k = 1; k < 60; ++k) {
+    for (int k = 1; k < 5 * (seconds - 1); ++k) {
       Trial window;
       window.X_WS = {0.3 * r, -0.2, 1.1 * r};
       window.run = 1;

@@ -1,0 +1,44 @@
+// What no hypothesis is of: something is wrong, but nothing has its name.
+#include <algorithm>
+#include <cmath>
+
+#include "master/ground/diagnose_ground.h"
+#include "tests/unit/ground/driven_log.h"
+
+namespace gapfarm {
+namespace {
+
+struct Outside {
+  const char* what;
+  double (*motor)(double command);  // rad/s, of 1 to 9
+  bool names_nothing;               // else its mean may have the name of a size
+};
+
+class OutsideCatalogue : public testing::TestWithParam<Outside> {};
+
+TEST_P(OutsideCatalogue, IsUnknownAndSaysWhatItDependsOn) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const Kinematics as_filed = off_by({"left", "right", "separation", "lag", "marker_x", "marker_y"},
+                                     {1, 1, 1, 0.1, 0.02, 0.01});
+  const auto found =
+      diagnose_ground(robot, driven(robot, as_filed, 0, 1, GetParam().motor, 45), {});
+  ASSERT_TRUE(found) << found.error().message;
+  const Diagnosis& d = found->diagnosis;
+  EXPECT_EQ(d.verdict, d.effects.empty() ? Verdict::kUnknown : Verdict::kEffectAndUnknown);
+  if (GetParam().names_nothing) {
+    EXPECT_TRUE(d.effects.empty()) << d.headline;
+  }
+  ASSERT_FALSE(d.findings.empty());
+  EXPECT_NE(d.findings.front().find("a correction by"), std::string::npos) << d.findings.front();
+  EXPECT_NE(d.findings.front().find("speeds"), std::string::npos) << d.findings.front();
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Motors, OutsideCatalogue,
+    testing::Values(Outside{"limit", [](double c) { return std::min(c, 6.0); }, true},
+                    Outside{"threshold", [](double c) { return std::abs(c) < 3 ? 0 : c; }, false},
+                    Outside{"coarse", [](double c) { return 2 * std::round(c / 2); }, false}),
+    [](const auto& of) { return std::string(of.param.what); });
+
+}  // namespace
+}  // namespace gapfarm
