@@ -271,7 +271,7 @@ std::vector<BaselineComparison> compare_with_baselines(std::span<const BaselineS
       c.model += model_scores[i];
       squares += gain * gain;
     }
-    if (c.trials == 0) continue;
+    if (c.trials < kLeastBaselineTrials) continue;
     const auto n = static_cast<double>(c.trials);
     c.baseline /= n;
     c.model /= n;

@@ -53,7 +53,8 @@ struct BaselineComparison {
 
   bool beaten() const { return model > baseline; }
 };
-// Baselines that can predict no trial are omitted.  REQUIRES: one model score a trial.
+// Baselines that can predict fewer than kLeastBaselineTrials are omitted: so few decide nothing.
+// REQUIRES: one model score a trial.
 std::vector<BaselineComparison> compare_with_baselines(std::span<const BaselineScores> baselines,
                                                        std::span<const double> model_scores);
 

@@ -74,15 +74,15 @@ TEST(Baselines, ReportNothingOfCommandsWithTooFewTrials) {
   TrialLog train = drawn(40, 0, 5);
   std::erase_if(train.trials,
                 [n = 0](const Trial& t) mutable { return t.command == "turn_cw" && ++n > 5; });
-  const auto scores = baseline_scores(train, drawn(10, 0, 6), kCommands);
+  const auto scores = baseline_scores(train, drawn(20, 0, 6), kCommands);
   ASSERT_TRUE(scores.ok());
   for (const BaselineScores& b : *scores) {
-    for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(b.scores[i].has_value(), i % 2 == 0) << b.name;
+    for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(b.scores[i].has_value(), i % 2 == 0) << b.name;
   }
-  const std::vector<double> model(10, 5.0);
+  const std::vector<double> model(20, 5.0);
   const auto compared = compare_with_baselines(*scores, model);
   ASSERT_EQ(compared.size(), 2u);
-  EXPECT_EQ(compared[0].trials, 5u);
+  EXPECT_EQ(compared[0].trials, 10u);
   EXPECT_EQ(compared[0].model, 5);
 }
 
@@ -105,13 +105,15 @@ TEST(Baselines, OfOtherFoldsDoNotKnowATrial) {
 }
 
 TEST(Baselines, ThatAreNotBeatenAreReported) {
-  const std::vector<BaselineScores> baselines = {{"constant motion", {6.0, 6.2}},
-                                                 {"mined motion", {5.0, std::nullopt}}};
-  const auto better = compare_with_baselines(baselines, std::vector<double>{7, 7});
-  EXPECT_EQ(better.size(), 2u);
-  EXPECT_EQ(better[1].trials, 1u);
+  const std::vector<std::optional<double>> many(kLeastBaselineTrials, 6.0);
+  std::vector<std::optional<double>> few = many;  // one decides nothing, nor do seven
+  few.front().reset();
+  const std::vector<BaselineScores> baselines = {{"constant motion", many}, {"mined motion", few}};
+  const auto better = compare_with_baselines(baselines, std::vector<double>(many.size(), 7));
+  ASSERT_EQ(better.size(), 1u);
+  EXPECT_EQ(better[0].trials, kLeastBaselineTrials);
   EXPECT_EQ(baseline_sentence(better, "the model").find("does not beat"), std::string::npos);
-  const auto worse = compare_with_baselines(baselines, std::vector<double>{5.5, 5.5});
+  const auto worse = compare_with_baselines(baselines, std::vector<double>(many.size(), 5.5));
   EXPECT_THAT(baseline_sentence(worse, "the model"),
               HasSubstr("the model does not beat constant motion:"));
   EXPECT_EQ(baseline_sentence({}, "the model"), "");
