@@ -17,9 +17,6 @@ constexpr double kLeastLevels = 10;
 constexpr double kCorrelated = 0.9;
 constexpr double kNormal_95 = 1.96;
 constexpr double kAtBound_share = 0.01;
-// A direction along which the whole range changes the log likelihood by less than this is flat: its
-// s.d. would be far beyond the range anyway.
-constexpr double kFlat_nats = 0.02;
 
 // Half widths that are tried, shares of the range.
 constexpr double kProbes[] = {0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003};
@@ -27,6 +24,8 @@ constexpr double kWanted_nats = 2;  // that a gene alone changes the likelihood 
 constexpr double kExplained = 0.9;  // of the variance: the quadratic fits
 constexpr double kCalm_nats = 0.5;  // or the scatter about it is as small as this
 constexpr int kRounds = 5;
+constexpr int kMoves = 8;            // of the box after the quadratic's top, at most
+constexpr double kFarthestMove = 2;  // half widths, along an axis by one move
 
 struct Design {
   std::vector<Genome> points;
@@ -59,6 +58,7 @@ Eigen::RowVectorXd features(const Eigen::VectorXd& x) {
 }
 
 struct Quadratic {
+  double value = 0;  // at the centre
   Eigen::VectorXd gradient;
   Eigen::MatrixXd hessian;  // of the function itself
   double roughness = 0;
@@ -75,6 +75,7 @@ Quadratic fit(const Eigen::MatrixXd& offsets, const Eigen::VectorXd& values,
   }
   const Eigen::VectorXd b = least_squares(design, values);
   Quadratic q;
+  q.value = b[0];
   q.gradient = b.segment(1, n).cwiseQuotient(widths);
   q.hessian.resize(n, n);
   Eigen::Index at = 1 + n;
@@ -93,8 +94,8 @@ Quadratic fit(const Eigen::MatrixXd& offsets, const Eigen::VectorXd& values,
 }
 
 void add_genes(const Problem& problem, const Genome& point, const std::vector<std::size_t>& moving,
-               const Eigen::MatrixXd& covariance, const DetermineSettings& settings,
-               DetermineReport& report) {
+               const Eigen::VectorXd& top, const Eigen::MatrixXd& covariance,
+               const DetermineSettings& settings, DetermineReport& report) {
   for (std::size_t k = 0; k < moving.size(); ++k) {
     const Gene& gene = problem.genes[moving[k]];
     const double g = point[moving[k]];
@@ -102,8 +103,8 @@ void add_genes(const Problem& problem, const Genome& point, const std::vector<st
     of.gene = gene;
     of.value = decode_gene(problem.table(), gene, g);
     of.deviation = std::sqrt(covariance(k, k));
-    const double low = std::clamp(g - kNormal_95 * of.deviation, 0.0, 1.0);
-    const double high = std::clamp(g + kNormal_95 * of.deviation, 0.0, 1.0);
+    const double low = std::clamp(top[k] - kNormal_95 * of.deviation, 0.0, 1.0);
+    const double high = std::clamp(top[k] + kNormal_95 * of.deviation, 0.0, 1.0);
     of.interval_95 = {decode_gene(problem.table(), gene, low),
                       decode_gene(problem.table(), gene, high)};
     of.determined = report.reliable && 2 * kNormal_95 * of.deviation < settings.share;
@@ -140,19 +141,32 @@ class Determination {
     hooks_.began(0);
     RETURN_IF_ERROR(find_widths());
     hooks_.began(1);
-    Quadratic quadratic;
-    for (std::uint64_t round = 0; round < kRounds && !report_.reliable; ++round) {
-      if (round > 0) {
+    centre_.resize(size());
+    for (Eigen::Index k = 0; k < size(); ++k) centre_[k] = point_[gene(k)];
+    double highest = -INFINITY;
+    Eigen::VectorXd best = centre_, step = Eigen::VectorXd::Zero(size());
+    int shrunk = 0;
+    for (std::uint64_t round = 0; round < kRounds + kMoves && shrunk < kRounds; ++round) {
+      if (round > 0) hooks_.began(1, points);
+      centre_ = best + step;
+      ASSIGN_OR_RETURN(const auto quadratic, fit_box(round));
+      const bool fits = quadratic.explained > kExplained || quadratic.roughness < kCalm_nats;
+      if (fits && quadratic.value >= highest) {
+        report_.reliable = true;
+        highest = quadratic.value;
+        best = centre_;
+        step = read_off(quadratic);
+        if (!report_.outside) break;
+        shrunk = 0;
+      } else {  // too far for a quadratic
+        if (!report_.reliable) read_off(quadratic);
         widths_ /= 2;
-        hooks_.began(1, points);
+        step /= 2;
+        ++shrunk;
       }
-      ASSIGN_OR_RETURN(auto fitted, fit_box(round));
-      quadratic = std::move(fitted);
-      report_.reliable = quadratic.explained > kExplained || quadratic.roughness < kCalm_nats;
     }
-    report_.roughness = quadratic.roughness;
-    report_.explained = quadratic.explained;
-    read_off(quadratic);
+    add_genes(problem_, point_, moving_, top_, covariance_, settings_, report_);
+    if (report_.reliable) add_compensations();
     return report_;
   }
 
@@ -189,6 +203,7 @@ class Determination {
     ASSIGN_OR_RETURN(const auto values, nats(genomes));
     if (!std::isfinite(values.front()))
       return Error{"the model itself does not end well on this log"};
+    at_point_ = values.front();
     std::size_t at = 1;
     for (Eigen::Index k = 0; k < size(); ++k) {
       for (const double width : kProbes) {
@@ -207,12 +222,9 @@ class Determination {
     return {};
   }
 
-  // A box about the point, moved inward where the range ends.
+  // A box about the centre, which moves inward where the range ends.
   Design draw(std::uint64_t round) {
-    centre_.resize(size());
-    for (Eigen::Index k = 0; k < size(); ++k) {
-      centre_[k] = std::clamp(point_[gene(k)], widths_[k], 1 - widths_[k]);
-    }
+    centre_ = centre_.cwiseMax(widths_).cwiseMin(Eigen::VectorXd::Ones(size()) - widths_);
     Design design;
     design.offsets.resize(points_of_a_box(), size());
     Stream stream(
@@ -251,22 +263,35 @@ class Determination {
     return fit(offsets, outcomes, widths_);
   }
 
-  void read_off(const Quadratic& quadratic) {
-    const SymmetricAxes axes = axes_of_symmetric(-quadratic.hessian);
-    report_.curvatures = axes.values;
-    report_.directions = axes.vectors;
-    const Eigen::VectorXd stiff = report_.curvatures.cwiseMax(kFlat_nats);
-    const Eigen::MatrixXd covariance =
-        axes.vectors * stiff.cwiseInverse().asDiagonal() * axes.vectors.transpose();
-    // Where the quadratic has its top, seen from the centre.
-    const Eigen::VectorXd top = covariance * quadratic.gradient;
-    const Eigen::VectorXd reach = 3 * covariance.diagonal().cwiseSqrt() + widths_;
-    report_.outside = (top.array().abs() > reach.array()).any();
-    add_genes(problem_, point_, moving_, covariance, settings_, report_);
-    if (!report_.reliable) return;
-    for (Eigen::Index a = 0; a < covariance.rows(); ++a) {
-      for (Eigen::Index b = a + 1; b < covariance.rows(); ++b) {
-        const double r = covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
+  // In half widths every gene counts alike, so that where one hardly matters the axes of the others
+  // stay their own.  Nothing is known less well along an axis than leads out of some gene's range.
+  // Gives the step to the top, as far along each axis as the quadratic is trusted.
+  Eigen::VectorXd read_off(const Quadratic& quadratic) {
+    const SymmetricAxes axes =
+        axes_of_symmetric(widths_.asDiagonal() * -quadratic.hessian * widths_.asDiagonal());
+    const Eigen::MatrixXd directions = widths_.asDiagonal() * axes.vectors;
+    const Eigen::VectorXd least =
+        directions.cwiseAbs().colwise().maxCoeff().transpose().cwiseAbs2();
+    const Eigen::VectorXd stiffness = axes.values.cwiseMax(least);
+    covariance_ = directions * stiffness.cwiseInverse().asDiagonal() * directions.transpose();
+    const Eigen::VectorXd up =
+        (directions.transpose() * quadratic.gradient).cwiseQuotient(stiffness);
+    top_ = (centre_ + directions * up).cwiseMax(0).cwiseMin(1);
+    const Eigen::VectorXd reach = widths_ + covariance_.diagonal().cwiseSqrt();
+    report_.outside = ((top_ - centre_).cwiseAbs().array() > reach.array()).any();
+    if (report_.outside) top_ = centre_;
+    const Eigen::VectorXd to = top_ - centre_;
+    report_.rise =
+        quadratic.value + to.dot(quadratic.gradient + 0.5 * quadratic.hessian * to) - at_point_;
+    report_.roughness = quadratic.roughness;
+    report_.explained = quadratic.explained;
+    return directions * up.cwiseMin(kFarthestMove).cwiseMax(-kFarthestMove);
+  }
+
+  void add_compensations() {
+    for (Eigen::Index a = 0; a < size(); ++a) {
+      for (Eigen::Index b = a + 1; b < size(); ++b) {
+        const double r = covariance_(a, b) / std::sqrt(covariance_(a, a) * covariance_(b, b));
         if (std::abs(r) < kCorrelated) continue;
         report_.compensations.push_back(
             {static_cast<std::size_t>(a), static_cast<std::size_t>(b), r});
@@ -283,7 +308,9 @@ class Determination {
   const DetermineSettings& settings_;
   const StageHooks& hooks_;
   std::vector<std::size_t> moving_;  // genes that take part
-  Eigen::VectorXd widths_, centre_;
+  Eigen::VectorXd widths_, centre_, top_;
+  Eigen::MatrixXd covariance_;
+  double at_point_ = 0;  // log likelihood, nats
   DetermineReport report_;
 };
 
@@ -319,7 +346,13 @@ std::string determine_text(const DetermineReport& report, const ParameterTable& 
   }
   if (report.outside) {
     text +=
-        "the likelihood rises beyond the box: the model is not at its maximum, evolve further\n";
+        "the likelihood rises beyond where was looked: the model is not at its maximum, evolve "
+        "further\n";
+  } else if (report.reliable && report.rise > kWanted_nats) {
+    text += fmt::format(
+        "the likelihood's maximum, about which the intervals are, is {:.1f} nats above the model: "
+        "evolve further\n",
+        report.rise);
   }
   text += fmt::format(
       "{} evaluations, {} failed; the simulation scatters by {:.2g} nats about the quadratic\n",

@@ -3,8 +3,8 @@
 //
 // Around a tuned point the log likelihood (mean log score times trials) is fitted by a quadratic
 // over points drawn in a box.  The box is as wide in each gene as changes the likelihood by some
-// nats, and shrinks while the quadratic fits badly.  Its curvature gives every gene's covariance,
-// given that all genes may move, and the directions along which the likelihood hardly changes.
+// nats, shrinks while the quadratic fits badly, and follows the quadratic to its top.  There its
+// curvature gives every gene's covariance, given that all genes may move.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,8 +29,8 @@ struct DetermineSettings {
 struct GeneDetermined {
   Gene gene;
   double value = 0;      // at the point, the parameter's unit
-  double deviation = 0;  // s.d., share of the range; infinite along flat directions
-  Interval interval_95;  // of the value, cut off at the range
+  double deviation = 0;  // s.d., share of the range; no more than leads out of some gene's range
+  Interval interval_95;  // about the quadratic's top, cut off at the range
   bool determined = false;
   bool at_bound = false;  // the point lies within a hundredth of an end of the range
 };
@@ -43,12 +43,11 @@ struct Compensation {  // two genes that make up for one another
 struct DetermineReport {
   std::vector<GeneDetermined> genes;
   std::vector<Compensation> compensations;  // |correlation| above 0.9, greatest first
-  Eigen::VectorXd curvatures;               // of -log likelihood, ascending, a unit of range
-  Eigen::MatrixXd directions;               // columns, one a curvature
   double roughness = 0;                     // s.d. of the likelihood about the quadratic, nats
   double explained = 0;                     // share of its variance that the quadratic explains
   bool reliable = false;                    // false: too rough or too bent to read anything off
-  bool outside = false;  // the quadratic rises beyond the box: the point is no maximum
+  double rise = 0;                          // of the log likelihood from the point to the top, nats
+  bool outside = false;  // it rises beyond the last box, too: the top was not reached
   std::size_t evaluations = 0, failures = 0;
 };
 

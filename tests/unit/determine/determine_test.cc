@@ -145,6 +145,39 @@ TEST(Determine, ReportsWhenThePointIsNoMaximumOrAtABound) {
   EXPECT_THAT(determine_text(*report, problem.table()), HasSubstr("evolve further"));
 }
 
+// What an evolution leaves is seldom the very top.
+TEST(Determine, PutsIntervalsAboutTheTopAndNotAboutTheModel) {
+  const Problem problem = three_genes(50);
+  const Eigen::Vector3d deviations(0.01, 0.02, 0.05), top(0.4, 0.5, 0.6);
+  const Eigen::Matrix3d information = deviations.cwiseAbs2().cwiseInverse().asDiagonal();
+  const auto report =
+      determine(problem, {0.47, 0.46, 0.6, 0.5}, quadratic(information, top, 50), {});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_FALSE(report->outside);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const GeneDetermined& gene = of(*report, i);
+    const auto share = [&](double value) { return encode_gene(problem.table(), gene.gene, value); };
+    EXPECT_NEAR(share(gene.interval_95.lower), top[k] - 1.96 * deviations[k], 1e-6);
+    EXPECT_NEAR(share(gene.interval_95.upper), top[k] + 1.96 * deviations[k], 1e-6);
+  }
+  EXPECT_NEAR(report->rise, 0.5 * (49 + 4), 1e-6);
+  EXPECT_THAT(determine_text(*report, problem.table()), HasSubstr("26.5 nats above the model"));
+}
+
+// One gene without a curvature of its own leaves the others what they are.
+TEST(Determine, AGeneThatHardlyMattersHidesNoOther) {
+  const Problem problem = three_genes(50);
+  Eigen::Matrix3d information = Eigen::Vector3d(1e6, 1e5, 0).asDiagonal();
+  information(0, 2) = information(2, 0) = -3e4;  // no maximum along some direction
+  const auto report =
+      determine(problem, {0.5, 0.5, 0.5, 0.5}, quadratic(information, {0.5, 0.5, 0.5}, 50), {});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_TRUE(of(*report, 0).determined);
+  EXPECT_TRUE(of(*report, 1).determined);
+  EXPECT_FALSE(of(*report, 2).determined);
+}
+
 TEST(Determine, RefusesWhatItCannotAnswer) {
   Problem problem = three_genes(50);
   const auto failing = [](const std::vector<Genome>& genomes) -> Result<std::vector<double>> {
