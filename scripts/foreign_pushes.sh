@@ -1,5 +1,5 @@
 #!/bin/sh
-# Diagnoses push logs by a simulator that shares nothing with gapfarm's (tests/planar_push): twenty-one
+# Diagnoses push logs by a simulator that shares nothing with gapfarm's (tests/planar_push): twenty-two
 # with one effect each and twenty from which nothing is missing, 95 pushes of four pieces each, every
 # log with frictions and pressures of its own.  The result is OUT/check/blind_check.md.
 #
@@ -34,7 +34,8 @@ camera_aspect ratio=0.95
 camera_distortion k1=0.15 x=0.5 y=0.5
 camera_distortion k1=-0.12 x=0.3 y=0.4
 marker_offset x=0.005 y=-0.004
-frame_offset x=0.003 y=-0.002'
+frame_offset x=0.003 y=-0.002
+pose_scale ratio=1.06'
 
 make_log() { "$out/make_log" "$@"; }
 

@@ -202,6 +202,9 @@ std::vector<Effect> build_push_catalogue() {
              {real("x", "m", 0, -0.05, 0.05, "logged position less the true one, world frame"),
               real("y", "m", 0, -0.05, 0.05, "same")},
              2),
+      camera("pose_scale", kStartHeading | kStartPlace,
+             "the camera's lengths differ from those of the finger's path",
+             {real("ratio", "-", 1, 0.5, 2, "logged lengths of poses over the finger's")}),
   };
 }
 

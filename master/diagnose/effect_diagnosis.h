@@ -94,6 +94,9 @@ struct EffectDiagnosis {
 
   // What is moved where base and effect are searched together; with `polar`, its strength alone.
   std::vector<SearchedSize> searched = {};
+  // The effect that a part of it is: named instead unless the whole gains as much more as a name
+  // asks for.
+  const char* part = nullptr;
   // Where such a search begins, beside what the sizes say; null: nowhere else.  Effects with a
   // place do nothing at their neutral value, and no slope leads away from it.
   std::vector<infer::Start> (*proposals)(const Study& study) = nullptr;

@@ -120,6 +120,25 @@ TEST_F(DiagnosePushes, WhatPredictsNothingKeepsNoOtherFromBeingFound) {
   EXPECT_TRUE(std::any_of(d["screening"].begin(), d["screening"].end(), of_patch));
 }
 
+// The scale is free beside an aspect, which then does as well, here by half a nat better.
+TEST_F(DiagnosePushes, AScaleIsNotNamedAnAspect) {
+  const Finished made =
+      run_program("planar_push_log", {folder_.path().string(), "136", "pose_scale.ratio=1.06"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  std::string config = text_of(GAPFARM_SOURCE_DIR "/configs/push.toml");
+  const std::string rate = "step_rate = 120";
+  ASSERT_NE(config.find(rate), std::string::npos);
+  config.replace(config.find(rate), rate.size(), "step_rate = 60");
+  const Json d =
+      diagnose_log(folder_.write("c.toml", config), folder_ / "trials.csv", folder_ / "d",
+                   {"--exclude", "friction_anisotropy", "friction_speed", "friction_patch",
+                    "table_tilt", "com_offset", "pressure_distribution", "finger_compliance",
+                    "placement_bias", "marker_offset", "camera_distortion"});
+  ASSERT_EQ(d["effects"].size(), 1u) << d["headline"];
+  EXPECT_EQ(d["effects"][0]["name"], "pose_scale");
+  EXPECT_NEAR(d["effects"][0]["parameters"]["ratio"]["value"], 1.06, 0.005);
+}
+
 TEST_F(DiagnosePushes, OfAFewPushesNothingIsReported) {
   const Json d = diagnose(12, {"com_offset.y=0.008"});
   EXPECT_EQ(d["verdict"], "unusable") << d["headline"];

@@ -69,6 +69,7 @@ Pose2 seen(const World& world, const Pose2& X, Random& random) {
   const Vec d = p - centre;
   p = centre + (1 + world.at("camera_distortion.k1") * dot(d, d)) * d;
   p = {p.x / root, p.y * root};
+  p = world.at("pose_scale.ratio") * p;
   p = p + Vec{world.at("frame_offset.x"), world.at("frame_offset.y")};
   const double x = random.normal(5e-4), y = random.normal(5e-4);
   return {p + Vec{x, y}, std::remainder(X.angle + random.normal(5e-3), 2 * kPi)};

@@ -78,7 +78,8 @@ inline Values neutral() {
           {"marker_offset.x", 0},
           {"marker_offset.y", 0},
           {"frame_offset.x", 0},
-          {"frame_offset.y", 0}};
+          {"frame_offset.y", 0},
+          {"pose_scale.ratio", 1}};
 }
 
 struct World {

@@ -145,6 +145,9 @@ constexpr EffectBehaviour kCameraEffects[] = {
          [](EffectValues p, const Pose& X_WM) {
            return Pose{X_WM.x - p[0], X_WM.y - p[1], X_WM.theta};
          }},
+    {.name = "pose_scale",
+     .observe = [](EffectValues p, const Pose& X_WR) { return scaled(X_WR, p[0], p[0]); },
+     .recover = [](EffectValues p, const Pose& X_WM) { return scaled(X_WM, 1 / p[0], 1 / p[0]); }},
     {.name = "pose_latency",  // p: share, age
      .reading =
          [](EffectValues p, Reading& reading) {

@@ -11,10 +11,7 @@
 namespace gapfarm {
 namespace {
 
-// What a camera does is reported, and is as unsure, whatever it looks at.
-std::vector<EffectDiagnosis> pushed_rows() {
-  const EffectDiagnosis& aspect = *drive_effect_diagnoses().find("camera_aspect");
-  const EffectDiagnosis& lens = *drive_effect_diagnoses().find("camera_distortion");
+std::vector<EffectDiagnosis> push_rows() {
   return {
       {.effect = "friction_anisotropy",
        .searched = {{"ratio", 0.2}},
@@ -59,6 +56,14 @@ std::vector<EffectDiagnosis> pushed_rows() {
        .phrases =
            {"Pieces truly start %1 along x and %2 along y from where the log says, turned by %3",
             {{"x", 1000, " mm"}, {"y", 1000, " mm"}, {"angle", 1000, " mrad"}}}},
+  };
+}
+
+// What a camera does is reported, and is as unsure, whatever it looks at.
+std::vector<EffectDiagnosis> camera_rows() {
+  const EffectDiagnosis& aspect = *drive_effect_diagnoses().find("camera_aspect");
+  const EffectDiagnosis& lens = *drive_effect_diagnoses().find("camera_distortion");
+  return {
       {.effect = "marker_offset",
        .searched = {{"x", 0.003}, {"y", 0.003}},
        .aliases = {"com_offset"},
@@ -71,8 +76,15 @@ std::vector<EffectDiagnosis> pushed_rows() {
                    {{"x", 1000, " mm"}, {"y", 1000, " mm"}}}},
       {.effect = "camera_aspect",
        .searched = {{"ratio", 0.02, true}, {"camera_scale", 0.02, true}},
+       .part = "pose_scale",
        .model_error = aspect.model_error,
        .phrases = {aspect.phrases.sentence, aspect.phrases.parameters}},
+      {.effect = "pose_scale",
+       .searched = {{"ratio", 0.02, true}},
+       .model_error = aspect.model_error,
+       .phrases = {"The camera's lengths are %1 times those of the finger's path",
+                   {{"ratio", 1, ""}},
+                   "Calibrate the camera's scale against the finger's"}},
       {.effect = "camera_distortion",
        .searched = {{"k1", 0.05}, {"x", 0.1}, {"y", 0.1}},
        .proposals = push_lens_starts,
@@ -117,7 +129,11 @@ std::vector<Patch> patch_grid(const Study& study, double radius_m) {
 }  // namespace
 
 const EffectDiagnoses& push_effect_diagnoses() {
-  static const std::vector<EffectDiagnosis> rows = pushed_rows();
+  static const std::vector<EffectDiagnosis> rows = [] {
+    std::vector<EffectDiagnosis> both = push_rows();
+    for (const EffectDiagnosis& row : camera_rows()) both.push_back(row);
+    return both;
+  }();
   static const EffectDiagnoses all(mapped(rows, [](const EffectDiagnosis& row) { return &row; }));
   return all;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -176,6 +177,18 @@ class Selection {
     return hypotheses;
   }
 
+  // What hardly gains more than a part of it alone would name too much.
+  void drop_wholes(const std::vector<infer::Hypothesis>& hypotheses,
+                   std::vector<infer::Contender>* contenders) const {
+    std::map<std::string, double> gains;
+    for (const infer::Contender& c : *contenders) gains[hypotheses[c.hypothesis].name] = c.gain;
+    std::erase_if(*contenders, [&](const infer::Contender& c) {
+      const char* part = of_.subject.effects->row(hypotheses[c.hypothesis].name).part;
+      return part != nullptr && gains.count(part) > 0 &&
+             c.gain - gains[part] < of_.subject.least_gain;
+    });
+  }
+
   bool enters(const infer::Contender& best, const std::string& name) const {
     return best.gain >= least_gain_of(name, study_, explained()) &&
            best.gain >= infer::kLeastSure * best.gain_se;
@@ -235,6 +248,7 @@ class Selection {
       step.offered.emplace_back(hypotheses[c.hypothesis].name, c.gain);
     }
     if (contest->contenders.empty()) return false;
+    drop_wholes(hypotheses, &contest->contenders);
     infer::Contender& best = contest->contenders.front();
     const std::string name = hypotheses[best.hypothesis].name;
     if (!enters(best, name)) return false;

@@ -121,6 +121,24 @@ TEST(PushEffects, FrameOffsetMovesBothReadingsAndNotTheFinger) {
   }
 }
 
+// A camera whose scale is not the finger's.
+TEST(PushEffects, PoseScaleStretchesBothReadingsAndNotTheFinger) {
+  const Problem problem = push_problem();
+  const v1::TaskResult plain = predicted(problem);
+  Problem stretched = problem;
+  push_value(stretched, "pose_scale.ratio") = 1.06;
+  for (Trial& trial : stretched.log.trials) {
+    trial.X_WS.x *= 1.06;
+    trial.X_WS.y *= 1.06;
+  }
+  const v1::TaskResult result = predicted(stretched);
+  for (int i = 0; i < 8; ++i) {
+    EXPECT_NEAR(end_of(result, i).x, 1.06 * end_of(plain, i).x, 1e-6);
+    EXPECT_NEAR(end_of(result, i).y, 1.06 * end_of(plain, i).y, 1e-6);
+    EXPECT_NEAR(end_of(result, i).theta, end_of(plain, i).theta, 1e-6);
+  }
+}
+
 // What influence and stability look at: without noise a trace ends where a prediction does, with
 // it beside, and equal streams give equal traces.
 TEST(PushScenario, TracesThePushOfATrial) {
