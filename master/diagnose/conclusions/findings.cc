@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <tuple>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -182,13 +183,14 @@ LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Ce
   v.trials = trials.size();
   v.paths = log.has_paths();
   for (const Trial& trial : log.trials) v.times = v.times || trial.t_s.has_value();
-  std::set<std::size_t> sessions, commands;
+  std::set<std::size_t> sessions;
+  std::set<std::tuple<std::size_t, MotionKind, int>> commands;  // free ones may have one name
   std::set<int> sectors;
   std::set<long> durations, levels;
   Extent box;
   for (const ResidualTrial& t : trials) {
     sessions.insert(t.session);
-    commands.insert(t.command);
+    commands.insert({t.command, cells[t.cell].kind, cells[t.cell].mirror});
     durations.insert(std::lround(1000 * cells[t.cell].command.duration_s));
     levels.insert(std::lround(1000 * cells[t.cell].level));
     sectors.insert(sector_of(t.X_WS.theta));

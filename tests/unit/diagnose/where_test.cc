@@ -368,6 +368,12 @@ TEST(Findings, ReportWhatThinDataCannotShow) {
   EXPECT_EQ(cautions({}, {}, TrialLog{}).size(), 1u);
 
   const LogVariety variety = log_variety(poor, rich.cells, TrialLog{});
+  EXPECT_EQ(variety.commands, 1u);
+  // Free commands under one name.
+  std::vector<ResidualTrial> free = rich.trials;
+  for (ResidualTrial& t : free) t.command = 0;
+  rich.cells.back().kind = MotionKind::kWide;
+  EXPECT_GT(log_variety(free, rich.cells, log).commands, 1u);
   const std::string text = alias_sentence("com_offset", {"marker_offset"}, lacking(variety));
   EXPECT_NE(text.find("marker_offset would explain about as much as com_offset"), std::string::npos)
       << text;
