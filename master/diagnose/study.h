@@ -111,8 +111,8 @@ struct Study {
 // config has searched.
 Result<Study> make_study(const Problem& problem, std::span<const Gene> genes);
 
-// Tunes the base parameters on the cells' medians (Gauss-Newton, robust), or keeps those of the
-// problem, and fills in predictions, residuals and gain derivatives.
+// Tunes the base parameters by fit_jointly(), or keeps those of the problem, and fills in
+// predictions, residuals and gain derivatives.
 Status tune_base(Predictor& predictor, bool keep, Study* study);
 
 // Rows of the base's parameters whose value in `at` lies where tuning has to stop.

@@ -130,7 +130,7 @@ TEST_F(DiagnoseExternal, NamesAnEffectOfTheMotorsAndLeavesAModelThatPredicts) {
 
 TEST_F(DiagnoseExternal, NamesAnEffectOfTheCameraAndNoneWhereNothingIsMissing) {
   expect_named(diagnose(two_tracks(), two_tracks(), 100, {"camera_aspect.ratio=1.08"}),
-               "camera_aspect", "ratio", 1.08, 0.012);
+               "camera_aspect", "ratio", 1.08, 0.016);
   const Json none = diagnose(two_tracks(), two_tracks(), 100, {});
   EXPECT_EQ(none["verdict"], "none") << none["headline"];
   // What the program does not take is reported, and not looked for.

@@ -142,17 +142,6 @@ void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
   }
 }
 
-// The base with a parameter moved by a share of its prior's unit.
-Overrides retuned(const Study& study, const RetunedParameter& parameter, double share) {
-  Overrides at = study.base;
-  if (parameter.unit == 0) {
-    at[parameter.row] *= 1 + share;
-  } else {
-    at[parameter.row] += share * parameter.unit;
-  }
-  return at;
-}
-
 }  // namespace
 
 bool commands_are_free(std::span<const Cell> cells) {
@@ -297,50 +286,38 @@ std::vector<std::vector<double>> drive_classes(const Study& study) {
   return classes;
 }
 
-Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s) {
-  Eigen::Vector3d sd = Eigen::Vector3d::Zero();
-  for (const Misfit& misfit : kMisfits) {
-    if (misfit.kind == cell.kind) sd[misfit.component] = misfit_size(misfit, cell.path, speed_m_s);
-  }
-  return sd;
+Eigen::MatrixXd misfit_columns(const Study& study) {
+  if (study.free_commands) return stack(smooth_misfits(study));
+  std::vector<Eigen::VectorXd> columns;
+  add_misfits(study, &columns);
+  return stack(columns);
 }
 
 Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& study) {
   constexpr double kStep = 0.05;
   constexpr double kLagStep = 0.02;  // s
-  std::vector<PredictionRequest> requests;
+  const ParameterTable& table = predictor.problem().table();
+  std::vector<Probe> probes;
   for (const RetunedParameter& r : study.drive.retuned) {
-    for (double share : {kStep, -kStep}) requests.push_back({retuned(study, r, share), {}});
+    Probe& probe = probes.emplace_back(share_probe(study, r.row, kStep));
+    probe.effect = "retuning " + table[r.row].key;
+    if (r.unit == 0) continue;
+    probe.plus.begin()->second = study.base.at(r.row) + kStep * r.unit;
+    probe.minus.begin()->second = study.base.at(r.row) - kStep * r.unit;
   }
-  const auto lag = predictor.problem().table().find("motor_lag.tau");
-  if (lag) {
-    requests.push_back({study.base, {}});
-    requests.back().at[*lag] = kLagStep;
+  if (table.find("motor_lag.tau")) {
+    probes.push_back({"", {{"motor_lag.tau", kLagStep}}, {}, kLagStep});
   }
-  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
-
-  const std::vector<Pose> middle = study.predicted_ends();
-  std::vector<Eigen::VectorXd> columns;
-  columns.push_back(0.3 * study.whiten(mapped(study.trials, of_gain)));
-  for (std::size_t r = 0; r < study.drive.retuned.size(); ++r) {
-    const RetunedParameter& parameter = study.drive.retuned[r];
-    const auto slope = central_slope(middle, ends[2 * r], ends[2 * r + 1], kStep);
-    if (slope) {
-      columns.push_back(parameter.prior_sd * study.whiten(*slope));
-    } else {
-      predictor.exclude("retuning " + predictor.problem().table()[parameter.row].key);
-    }
+  ASSIGN_OR_RETURN(const auto slopes, probe_all(predictor, study, probes));
+  std::vector<Eigen::VectorXd> columns = {0.3 * study.whiten(mapped(study.trials, of_gain))};
+  for (std::size_t k = 0; k < probes.size(); ++k) {
+    // Motors of some hundredths of a second are part of any robot.
+    const bool lag = k == study.drive.retuned.size();
+    const double prior_sd = lag ? 0.02 : study.drive.retuned[k].prior_sd;
+    if (!slopes[k].empty()) columns.push_back(prior_sd * study.whiten(slopes[k]));
   }
-  // Motors of some hundredths of a second are part of any robot.
-  if (lag && ends.back()) {
-    columns.push_back(0.02 * study.whiten(differences(middle, *ends.back(), kLagStep)));
-  }
-  if (study.free_commands) {
-    for (Eigen::VectorXd& column : smooth_misfits(study)) columns.push_back(std::move(column));
-  } else {
-    add_misfits(study, &columns);
-  }
-
+  const Eigen::MatrixXd misfits = misfit_columns(study);
+  for (const auto& column : misfits.colwise()) columns.emplace_back(column);
   return stack(columns);
 }
 

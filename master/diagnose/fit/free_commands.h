@@ -50,9 +50,9 @@ std::vector<std::vector<double>> drive_classes(const Study& study);
 // Speed at which the misfits of starting and stopping were measured.
 inline constexpr double kMeasuredSpeed_m_s = 0.28;
 
-// Standard deviation (m, m, rad) of what a simulation of other physics gets wrong of a cell's mean
-// motion, in ways that are alike for its mirror image; 0 where symmetry forbids it.
-Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s);
+// Whitened columns of prior standard deviation 1: what a simulation of other physics gets wrong of
+// the motion, in ways that are alike for a command and its mirror image.
+Eigen::MatrixXd misfit_columns(const Study& study);
 
 // Whitened columns scaled to a prior standard deviation of 1: retuning of the base (free within its
 // bounds), and, for each kind of drive, level and duration, an offset that is alike for a command

@@ -54,13 +54,10 @@ Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const 
   return slopes;
 }
 
-std::optional<Slope> central_slope(const std::vector<Pose>& middle,
-                                   const std::optional<std::vector<Pose>>& up,
-                                   const std::optional<std::vector<Pose>>& down, double step) {
-  if (up && down) return differences(*down, *up, 2 * step);
-  if (up) return differences(middle, *up, step);
-  if (down) return differences(middle, *down, -step);
-  return std::nullopt;
+Probe share_probe(const Study& study, std::size_t row, double share) {
+  const std::string& key = (*study.table)[row].key;
+  const double value = study.base.at(row);
+  return {"", {{key, value * (1 + share)}}, {{key, value * (1 - share)}}, 2 * share};
 }
 
 std::vector<Probe> lens_probes(const Eigen::Vector2d& middle) {
@@ -118,7 +115,7 @@ Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor
     for (std::size_t i = 0; i < d.size(); ++i) d[i] -= below[i];
   }
   for (std::size_t k = 0; k < all.size(); ++k) {
-    if (all[k].empty()) predictor.exclude(probes[k].effect);
+    if (all[k].empty() && !probes[k].effect.empty()) predictor.exclude(probes[k].effect);
   }
   return all;
 }

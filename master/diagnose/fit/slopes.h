@@ -39,18 +39,15 @@ Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const O
 Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const SlopePoint& from,
                                                     const std::vector<SlopeRequest>& requests);
 
-// Between `up` and `down`, which lie `step` on either side of the middle; one of them alone is held
-// against the middle; none without both.
-std::optional<Slope> central_slope(const std::vector<Pose>& middle,
-                                   const std::optional<std::vector<Pose>>& up,
-                                   const std::optional<std::vector<Pose>>& down, double step);
-
 // One finite difference: parameters at `plus`, less those at `minus` (empty: neutral).
 struct Probe {
   std::string effect;
   std::map<std::string, double> plus, minus;
   double scale = 1;
 };
+
+// A share of a base parameter's value to either side.
+Probe share_probe(const Study& study, std::size_t row, double share);
 
 // Of camera_distortion: its strength about the middle of the trials, and where its centre lies, to
 // first order along x and y.
@@ -62,7 +59,7 @@ Overrides base_with(const Predictor& predictor, const Study& study,
 
 // Differences of the ends over each probe's scale, in the axes of the base's ends: one batch of
 // farm work.  Where one of two sides cannot be simulated, the other one counts twice; a probe
-// without any is empty.
+// without any is empty, and its effect, where it has a name, excluded.
 Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor,
                                                             const Study& study,
                                                             const std::vector<Probe>& probes);

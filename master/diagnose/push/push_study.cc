@@ -10,6 +10,7 @@
 #include "common/parameters/push.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/fit/estimate.h"
+#include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/push/push_subject.h"
 
 namespace gapfarm {
@@ -132,34 +133,18 @@ Status measure_retuning(Predictor& predictor, Study* study) {
     const bool known = contains(parameters, row_of(row), &BaseParameter::row);
     if (!known) parameters.push_back({row_of(row), prior});
   }
-  std::vector<PredictionRequest> requests;
-  std::vector<double> steps;
+  std::vector<Probe> probes;
   for (const BaseParameter& p : parameters) {
+    const Parameter& row = (*study->table)[p.row];
     const double value = value_at(predictor.problem(), study->base, p.row);
-    const auto at = [&](double log_step) {
-      return std::clamp(value * std::exp(log_step), (*study->table)[p.row].lower,
-                        (*study->table)[p.row].upper);
-    };
-    const double up = at(kRetuningStep), down = at(-kRetuningStep);
-    for (double moved : {up, down}) {
-      requests.push_back({study->base, {}});
-      requests.back().at[p.row] = moved;
-    }
-    steps.push_back(std::log(up / down));
+    const double up = std::clamp(value * std::exp(kRetuningStep), row.lower, row.upper);
+    const double down = std::clamp(value * std::exp(-kRetuningStep), row.lower, row.upper);
+    probes.push_back({"", {{row.key, up}}, {{row.key, down}}, std::log(up / down)});
   }
-  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
+  ASSIGN_OR_RETURN(auto slopes, probe_all(predictor, *study, probes));
   study->retuned.clear();
   for (std::size_t k = 0; k < parameters.size(); ++k) {
-    const auto& above = ends[2 * k];
-    const auto& below = ends[2 * k + 1];
-    if (!above || !below) continue;
-    RetunedPush& retuned = study->retuned.emplace_back();
-    retuned.parameter = parameters[k];
-    for (std::size_t i = 0; i < study->size(); ++i) {
-      const Pose& X_WP = study->trials[i].X_WP;
-      retuned.slopes.push_back(
-          (local_difference(X_WP, (*above)[i]) - local_difference(X_WP, (*below)[i])) / steps[k]);
-    }
+    if (!slopes[k].empty()) study->retuned.push_back({parameters[k], std::move(slopes[k])});
   }
   return {};
 }

@@ -88,14 +88,5 @@ TEST(Verdict, FollowsWhatIsNamedAndWhatIsLeft) {
   EXPECT_EQ(judge_verdict(true, 100, twelfth, kLeast, kWrongShareOfTwo), Verdict::kUnknown);
 }
 
-TEST(Nuisances, RespectSymmetry) {
-  const Cell straight{{"forward", 1, 1, 1}, MotionKind::kStraight, 1, 1, 1, 1};
-  const Cell turn{{"turn_ccw", -1, 1, 1}, MotionKind::kTurn, 1, 1, 1, 1};
-  EXPECT_GT(misfit_sd(straight, 0.28).x(), 0);
-  EXPECT_EQ(misfit_sd(straight, 0.28).tail<2>().norm(), 0);
-  EXPECT_GT(misfit_sd(turn, 0.28)[2], 0);
-  EXPECT_EQ(misfit_sd(turn, 0.28).head<2>().norm(), 0);
-}
-
 }  // namespace
 }  // namespace gapfarm::regression_test

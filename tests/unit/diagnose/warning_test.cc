@@ -64,16 +64,27 @@ TEST(Slopes, StayWithinBoundsAndWhereTheRobotComesToRest) {
   EXPECT_FALSE((*none)[0]);
 }
 
-TEST(Slopes, OneSideAloneIsHeldAgainstTheMiddle) {
-  const std::vector<Pose> middle = {{1, 0, 0}};
-  const std::vector<Pose> up = {{1.2, 0, 0}}, down = {{0.8, 0, 0}};
-  for (const auto& slope :
-       {central_slope(middle, up, down, 0.1), central_slope(middle, up, std::nullopt, 0.1),
-        central_slope(middle, std::nullopt, down, 0.1)}) {
-    ASSERT_TRUE(slope);
-    EXPECT_NEAR((*slope)[0].x(), 2, 1e-12);
+TEST(Slopes, OneSideAloneCountsTwice) {
+  const std::size_t speed = row_of(Srv1::kFullSpeed);
+  Problem problem = kinematic_log(12);
+  const double value = problem.values[speed];
+  const auto slopes = [&](double least, double most) {
+    KinematicFarm farm(
+        [=](const ParameterValues& v) { return v[speed] < least || v[speed] > most; });
+    Predictor predictor(farm, problem);
+    Study study = make_study(problem, {}).value();
+    study.base[speed] = value;
+    study.use_predicted_ends(predictor.ends({{study.base, {}}})->front());
+    return probe_all(predictor, study, {share_probe(study, speed, 0.02)})->front();
+  };
+  const std::vector<Eigen::Vector3d> both = slopes(0, INFINITY);
+  ASSERT_EQ(both.size(), 12U);
+  for (const auto& one : {slopes(value, INFINITY), slopes(0, value)}) {
+    ASSERT_EQ(one.size(), both.size());
+    for (std::size_t i = 0; i < both.size(); ++i)
+      EXPECT_LT((one[i] - both[i]).norm(), 0.05 * both[i].norm());
   }
-  EXPECT_FALSE(central_slope(middle, std::nullopt, std::nullopt, 0.1));
+  EXPECT_TRUE(slopes(value, value).empty());
 }
 
 TEST(PrepareLog, TakesALogFarOffRelativeToItsOwnMiddle) {
