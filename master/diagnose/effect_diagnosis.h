@@ -48,9 +48,6 @@ struct ProbedStep {
   bool both_ways;
 };
 
-// Derivatives of the ends, a probe each.
-using ProbedSlopes = std::span<const std::vector<Eigen::Vector3d>>;
-
 // A strength and a direction, whose first two columns belong to its cosine and sine.
 struct Polar {
   const char* strength;
@@ -101,12 +98,10 @@ struct EffectDiagnosis {
   // place do nothing at their neutral value, and no slope leads away from it.
   std::vector<infer::Start> (*proposals)(const Study& study) = nullptr;
 
-  // Its mark: by steps of parameters, or by probes of its own; without either it is looked for in
-  // another way.
+  // Its mark: by steps of parameters, by the strength and direction that are searched, or by probes
+  // of its own; without any it is looked for in another way.
   std::vector<ProbedStep> steps = {};
   std::vector<Probe> (*probes)(const Study& study) = nullptr;
-  // From the probes' slopes; null: one signature with a column a probe.
-  std::vector<Signature> (*signatures)(const Study& study, ProbedSlopes slopes) = nullptr;
   // Without a probe: marks at places, which the log alone shows.
   std::vector<Signature> (*marks)(const Study& study) = nullptr;
   // One level and one duration show nothing of it that another full speed would not do.

@@ -55,7 +55,6 @@ DriveBase srv1_base() {
                   {row_of(Srv1::kFriction), 0.5},      {row_of(Srv1::kTrackGauge), 0.2},
                   {row_of(Srv1::kTreadCreep), 1},      {row_of(Srv1::kMassHeight), 1}};
   base.speed = row_of(Srv1::kFullSpeed);
-  base.mass_height = row_of(Srv1::kMassHeight);
   return base;
 }
 

@@ -38,7 +38,6 @@ struct DriveBase {
   // Row of the speed at full duty.  Of a program's parameters tune_base() finds it, if there is
   // one.
   std::optional<std::size_t> speed;
-  std::optional<std::size_t> mass_height;
 };
 
 // Of srv1, or of what the problem's program declares: of that, `genes` are tuned whose values are
@@ -121,11 +120,5 @@ std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at)
 // From the first ends to the others, in the axes of the first, divided by `scale`.
 std::vector<Eigen::Vector3d> differences(const std::vector<Pose>& from, const std::vector<Pose>& to,
                                          double scale = 1);
-
-// Whether a drive sticks: Coulomb treads then give way to no small force, real ones creep in
-// proportion to it.
-inline bool is_straight(const Study& study, std::size_t trial) {
-  return study.cells[study.trials[trial].cell].kind == MotionKind::kStraight;
-}
 
 }  // namespace gapfarm

@@ -73,6 +73,46 @@ extern const EffectDiagnosis kBacklash = {
                 "Take up the play before a drive"},
 };
 
+extern const EffectDiagnosis kRollingResistance = {
+    .effect = "rolling_resistance",
+    .steps = {{"coefficient", 0.05, false}},
+    .changes_reach = true,
+    .by_contact = true,
+    .family = &kReachFamily,
+    .aliases = {"motor_deadband"},
+    .model_error = 0.3,
+    .phrases = {"Rolling drags with %1 of the weight",
+                {{"coefficient", 100, " %"}},
+                "Give the simulation that drag"},
+};
+
+extern const EffectDiagnosis kFloorTilt = {
+    .effect = "floor_tilt",
+    .searched = {{"angle", 0.03}},
+    .by_contact = true,
+    .family = &kSlopeFamily,
+    .polar = Polar{"floor_tilt.angle", "floor_tilt.direction", 1, false},
+    .model_error = 0.3,
+    .direction_error_rad = 0.02,
+    .phrases = {"The floor falls by %1 toward %2",
+                {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}},
+                "Level the floor",
+                "The floor slopes by %1 toward %2"},
+};
+
+extern const EffectDiagnosis kFloorNap = {
+    .effect = "floor_nap",
+    .searched = {{"strength", 0.1}, {"direction", 0.2}},
+    .by_contact = true,
+    .family = &kSlopeFamily,
+    .model_error = 0.2,
+    .direction_error_rad = 0.02,
+    .phrases = {"The floor has a nap that drags with %1 of the weight against %2",
+                {{"strength", 100, " %"}, {"direction", kDegrees, " degrees"}},
+                "Drive on a floor without pile",
+                "The floor has a nap that drags with %1 of the weight"},
+};
+
 extern const EffectDiagnosis kComOffset = {
     .effect = "com_offset",
     .steps = {{"x", 0.003, true}, {"y", 0.003, true}},

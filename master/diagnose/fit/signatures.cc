@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numbers>
 
 #include "common/base/ranges.h"
 #include "common/base/try.h"
@@ -12,12 +13,39 @@
 namespace gapfarm {
 namespace {
 
-// Those of an effect's own, or its parameters moved by their steps.
+constexpr double kThirdOfTurn_rad = 2 * std::numbers::pi / 3;
+constexpr int kDirections = 24;
+
+std::string key_of(const EffectDiagnosis& row, const char* key) {
+  return std::string(row.effect) + "." + key;
+}
+
+// A strength, first, that acts in a direction.
+bool is_turned(const EffectDiagnosis& row) {
+  return row.polar || std::ranges::any_of(row.searched, [](const SearchedSize& size) {
+           return std::string_view(size.key) == "direction";
+         });
+}
+
+// Of the strength as it is searched: along both axes where these are its coordinates, else in three
+// directions, from which all follow.
+std::vector<Probe> turned_probes(const EffectDiagnosis& row) {
+  const std::string direction = key_of(row, "direction");
+  const auto& [strength, size, logarithm] = row.searched.front();
+  std::vector<double> turns = {0, kThirdOfTurn_rad, -kThirdOfTurn_rad};
+  if (row.polar) turns = {0, std::numbers::pi / 2 / row.polar->symmetry};
+  return mapped(turns, [&](double turn) {
+    return Probe{row.effect, {{key_of(row, strength), size}, {direction, turn}}, {}, size};
+  });
+}
+
+// Those of an effect's own, of its strength in directions, or its parameters moved by their steps.
 std::vector<Probe> probes_of(const EffectDiagnosis& row, const Study& study) {
   if (row.probes != nullptr) return row.probes(study);
+  if (is_turned(row)) return turned_probes(row);
   std::vector<Probe> all;
   for (const ProbedStep& step : row.steps) {
-    const std::string key = std::string(row.effect) + "." + step.key;
+    const std::string key = key_of(row, step.key);
     const Parameter& parameter = (*study.table)[study.table->row(key)];
     const double neutral = parameter.nominal;
     const double size = step.size * (parameter.unit == "m" ? study.scale : 1);
@@ -43,8 +71,8 @@ bool one_condition(const Study& study) {
 }
 
 // A column a probe.
-Signature plain_signature(const EffectDiagnosis& row, const Study& study, ProbedSlopes slopes,
-                          std::span<const Probe> probes) {
+Signature plain_signature(const EffectDiagnosis& row, const Study& study,
+                          std::span<const Slope> slopes, std::span<const Probe> probes) {
   Signature s;
   s.effect = row.effect;
   s.columns = stack(mapped(slopes, [&](const auto& d) { return study.whiten(d); }));
@@ -53,6 +81,23 @@ Signature plain_signature(const EffectDiagnosis& row, const Study& study, Probed
     if (probe.plus.size() == 1) s.parameters.push_back(probe.plus.begin()->first);
   }
   return s;
+}
+
+// Of a plain signature of three directions one in each of many: a force has a part that is the same
+// in all of them, and one that turns with them.
+std::vector<Signature> in_directions(const EffectDiagnosis& row, const Signature& three) {
+  std::vector<Signature> all;
+  for (int k = 0; k < kDirections; ++k) {
+    const double direction = wrap_angle(2 * std::numbers::pi * k / kDirections);
+    const Eigen::Vector3d from(direction, direction - kThirdOfTurn_rad,
+                               direction + kThirdOfTurn_rad);
+    Signature& s = all.emplace_back(three);
+    s.columns = three.columns * ((1 + 2 * from.array().cos()) / 3).matrix();
+    s.parameters = {key_of(row, row.searched.front().key)};
+    s.fixed = {{key_of(row, "direction"), direction}};
+    s.penalty = 2;  // of the directions, too
+  }
+  return all;
 }
 
 }  // namespace
@@ -100,17 +145,15 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
       std::vector<Signature> all = row->marks(study);
       std::move(all.begin(), all.end(), std::back_inserter(marks));
     }
-    const ProbedSlopes slopes = ProbedSlopes(probed).subspan(from, count);
-    if (slopes.empty() || std::ranges::any_of(slopes, [](const auto& d) { return d.empty(); })) {
-      continue;
+    const std::span<const Slope> slopes = std::span<const Slope>(probed).subspan(from, count);
+    if (slopes.empty() || std::ranges::any_of(slopes, &Slope::empty)) continue;
+    Signature plain =
+        plain_signature(*row, study, slopes, std::span<const Probe>(probes).subspan(from, count));
+    if (!is_turned(*row) || row->polar) {
+      found.push_back(std::move(plain));
+    } else {
+      std::ranges::move(in_directions(*row, plain), std::back_inserter(found));
     }
-    if (row->signatures == nullptr) {
-      found.push_back(plain_signature(*row, study, slopes,
-                                      std::span<const Probe>(probes).subspan(from, count)));
-      continue;
-    }
-    std::vector<Signature> all = row->signatures(study, slopes);
-    std::move(all.begin(), all.end(), std::back_inserter(found));
   }
   std::move(marks.begin(), marks.end(), std::back_inserter(found));
   const bool only_reach = one_condition(study);

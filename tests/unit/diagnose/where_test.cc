@@ -279,7 +279,10 @@ TEST(Findings, EveryEffectOfACatalogueHasARow) {
   for (const Effect& effect : srv1_effects_and_seconds()) {
     const EffectDiagnosis* row = drive_effect_diagnoses().find(effect.name);
     ASSERT_NE(row, nullptr) << effect.name << " has no row in master/diagnose/effects/rows.inc";
-    const bool shown = !row->steps.empty() || row->probes != nullptr || row->marks != nullptr;
+    const bool turned = std::ranges::any_of(
+        effect.parameters, [](const Parameter& p) { return p.key == "direction"; });
+    const bool shown =
+        turned || !row->steps.empty() || row->probes != nullptr || row->marks != nullptr;
     EXPECT_EQ(shown, effect.moves_means() && searched.count(effect.name) == 0) << effect.name;
     for (const ProbedStep& step : row->steps) {
       EXPECT_TRUE(std::any_of(effect.parameters.begin(), effect.parameters.end(),
