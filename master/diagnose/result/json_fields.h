@@ -39,6 +39,12 @@ class Fields {
     convert(key, json_[key], field);
   }
 
+  // A value that stands elsewhere, in a table's row.
+  template <class T>
+  void cell(const std::string& column, const Json& json, T& field) {
+    convert(column.c_str(), json, field);
+  }
+
   // A field that an earlier version, or another program, may omit.
   template <class T>
   void later(const char* key, T& field) {

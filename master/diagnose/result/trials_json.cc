@@ -1,11 +1,8 @@
 // Trials as a table, drives with their paths, and how the pictures describe both.
 
-#include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
-#include "common/base/text.h"
 #include "common/json/json.h"
 #include "common/math/digits.h"
 #include "master/diagnose/result/diagnosis_json.h"
@@ -63,25 +60,6 @@ DiagnosedTrial blank_trial() {
   return trial;
 }
 
-// Whether `json` fits `field`; sets it when so.
-template <class Field>
-bool read_cell(const Json& json, Field& field) {
-  if constexpr (std::is_same_v<Field, std::string>) {
-    if (!json.is_string()) return false;
-  } else if constexpr (std::is_same_v<Field, bool>) {
-    if (!json.is_boolean()) return false;
-  } else if constexpr (std::is_integral_v<Field>) {
-    if (!json.is_number_integer()) return false;
-  } else if (json.is_null()) {
-    field = std::numeric_limits<double>::quiet_NaN();
-    return true;
-  } else if (!json.is_number()) {
-    return false;
-  }
-  field = json.get<Field>();
-  return true;
-}
-
 }  // namespace
 
 Json trials_json(const Diagnosis& diagnosis, int digits) {
@@ -121,20 +99,18 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
   std::vector<DiagnosedTrial> trials;
   trials.reserve(table["rows"].size());
   for (const Json& row : table["rows"]) {
-    const std::string where = "diagnosis.json: trials.rows[" + std::to_string(trials.size()) + "]";
+    const std::string where = "trials.rows[" + std::to_string(trials.size()) + "]";
     if (!row.is_array() || row.size() != expected.size()) {
-      return Error{where + " must be a list of " + std::to_string(expected.size()) + " cells"};
+      return Error{"diagnosis.json: " + where + " must be a list of " +
+                   std::to_string(expected.size()) + " cells"};
     }
     DiagnosedTrial trial = blank_trial();
     trial.covariates.resize(shown.size());
     std::size_t column = 0;
     std::string error;
+    Fields cells(table, where, error);
     const auto read = [&](const std::string& name, auto& field) {
-      const Json& cell = row[column++];
-      if (error.empty() && !read_cell(cell, field)) {
-        error =
-            where + ": " + name + " is " + json_text(cell) + ", which is not of its column's type";
-      }
+      cells.cell(name, row[column++], field);
     };
     visit_columns(trial, read);
     for (std::size_t k = 0; k < shown.size(); ++k) read(shown[k].key, trial.covariates[k]);

@@ -101,7 +101,7 @@ TEST(DiagnosisJson, ReportsWhatIsWrong) {
   EXPECT_THAT(error_of("/gap/position_mm/tuned", true), HasSubstr("gap.position_mm.tuned"));
   EXPECT_THAT(error_of("/where/0", "x"), HasSubstr("where[0]"));
   EXPECT_THAT(error_of("/cautions", "careful"), HasSubstr("cautions"));
-  EXPECT_THAT(error_of("/trials/rows/5/0", 5), HasSubstr("trials.rows[5]: session is 5"));
+  EXPECT_THAT(error_of("/trials/rows/5/0", 5), HasSubstr("trials.rows[5].session is 5"));
   EXPECT_THAT(error_of("/trials/rows/2", 5), HasSubstr("trials.rows[2]"));
   EXPECT_THAT(error_of("/trials/columns/0", "run"), HasSubstr("trials.columns"));
   EXPECT_FALSE(parse_diagnosis("{\"version\": 1").ok());
