@@ -234,16 +234,20 @@ std::string alias_sentence(const std::string& effect, const std::vector<std::str
   return text + ".";
 }
 
+std::string few_trials_caution(std::size_t trials, const std::string& one,
+                               const std::string& many) {
+  if (trials >= kFewTrialsToJudge) return "";
+  return "There " + std::string(trials == 1 ? "is " : "are ") + counted(trials, one, many) +
+         "; below " + std::to_string(kFewTrialsToJudge) +
+         " only large effects show, and no claim is sure.";
+}
+
 std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                                   std::span<const Cell> cells, const TrialLog& log) {
   const LogVariety v = log_variety(trials, cells, log);
   std::vector<std::string> text;
-  if (v.trials < kFewTrialsToJudge) {
-    text.push_back("There " + std::string(v.trials == 1 ? "is " : "are ") +
-                   counted(v.trials, "trial", "trials") + "; below " +
-                   std::to_string(kFewTrialsToJudge) +
-                   " only large effects show, and no claim is sure.");
-  }
+  const std::string few = few_trials_caution(v.trials, "trial", "trials");
+  if (!few.empty()) text.push_back(few);
   if (v.trials == 0) return text;
   if (commands_are_free(cells)) {
     text.emplace_back(

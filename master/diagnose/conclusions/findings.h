@@ -70,6 +70,9 @@ std::vector<std::string> lacking(const LogVariety& variety);
 std::string alias_sentence(const std::string& effect, const std::vector<std::string>& aliases,
                            std::span<const std::string> lacks);
 
+// "There are 12 trials; below 60 ...": one sentence, where so few were made; else empty.
+std::string few_trials_caution(std::size_t trials, const std::string& one, const std::string& many);
+
 // What cannot be seen, or not be trusted, in data as thin as these; one sentence each.
 std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                                   std::span<const Cell> cells, const TrialLog& log);

@@ -132,13 +132,8 @@ std::vector<std::string> push_cautions(const Study& study, const TrialLog& log) 
   const PushVariety v = variety(study, log);
   std::vector<std::string> text;
   const auto add_caution = [&](const std::string& sentence) { text.push_back(sentence); };
-  if (study.size() < kFewTrialsToJudge) {
-    add_caution("There " +
-                std::string(study.size() == 1 ? "is 1 push"
-                                              : "are " + std::to_string(study.size()) + " pushes") +
-                "; below " + std::to_string(kFewTrialsToJudge) +
-                " only large effects show, and no claim is sure.");
-  }
+  const std::string few = few_trials_caution(study.size(), "push", "pushes");
+  if (!few.empty()) add_caution(few);
   if (v.missed > 0) {
     add_caution(std::to_string(v.missed) + " of " + std::to_string(study.size()) +
                 " pushes do not touch their piece where the log has it; they say little.");
