@@ -6,13 +6,15 @@
 #include <numbers>
 
 #include "common/score/density.h"
+#include "master/diagnose/evidence/noise.h"
+#include "master/diagnose/subject.h"
 #include "master/infer/climb.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kLeastDeviation = 1e-4, kMostDeviation = 0.5;
-constexpr double kNoDensity = -1e3;
+constexpr double kMostOutlierDeviation = 0.5;
+constexpr double kNoOutlierDensity = -1e3;
 constexpr int kMostEvaluations = 350;
 constexpr int kMostToMove = 120;  // from where all trials led
 
@@ -43,11 +45,12 @@ constexpr Reach kReaches[] = {{{0.01, 0.45}, {-0.5, 0.5}},
                               {{0.02, 3}, {0, 0}},
                               {{5e-4, 0.3}, {1e-3, 1}}};
 
-Search search_from(const OutlierNoise& noise, const OutlierDrives* outliers) {
+Search search_from(const NoiseEstimate& noise, const OutlierDrives* outliers) {
   Search search;
-  for (const double deviation : noise) {
+  for (const double deviation :
+       {noise.drive_common, noise.drive_side, noise.pose.position_m, noise.pose.heading_rad}) {
     search.add(std::log(std::max(deviation, kLeastDeviation)), std::log(kLeastDeviation),
-               std::log(kMostDeviation), 0.2);
+               std::log(kMostOutlierDeviation), 0.2);
   }
   if (outliers == nullptr) return search;
   const auto [half, middle] = kReaches[static_cast<std::size_t>(outliers->kind)];
@@ -66,8 +69,8 @@ Search search_from(const OutlierNoise& noise, const OutlierDrives* outliers) {
   return search;
 }
 
-OutlierNoise noise_at(const double* x) {
-  return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])};
+NoiseEstimate noise_at(const double* x) {
+  return {{std::exp(x[2]), std::exp(x[3])}, std::exp(x[0]), std::exp(x[1])};
 }
 
 OutlierDrives contaminates_at(const OutlierDrives& like, const double* x) {
@@ -90,11 +93,8 @@ OutlierDrives contaminates_at(const OutlierDrives& like, const double* x) {
 // Log densities of the ways in which a trial may end, weights included, the first that of a drive
 // that is no outlier; none where there is no density.
 std::vector<double> ways_of(const OutlierData& data, std::size_t i, const Eigen::Vector3d& residual,
-                            const OutlierNoise& noise, const OutlierDrives* outliers) {
-  Eigen::Matrix3d core = Eigen::Matrix3d::Zero();
-  for (std::size_t k = 0; k < noise.size(); ++k) {
-    core += noise[k] * noise[k] * data.covariances[i][k];
-  }
+                            const NoiseEstimate& noise, const OutlierDrives* outliers) {
+  const Eigen::Matrix3d core = data.study.subject->covariance(data.study.trials[i], noise);
   const auto whole = Covariance3::factorise(core);
   if (!whole) return {};
   if (outliers == nullptr) return {log_predictive_density(residual, *whole, data.outlier_share)};
@@ -113,9 +113,9 @@ std::vector<double> ways_of(const OutlierData& data, std::size_t i, const Eigen:
 }
 
 double score_of(const OutlierData& data, std::size_t i, const Eigen::Vector3d& residual,
-                const OutlierNoise& noise, const OutlierDrives* outliers) {
+                const NoiseEstimate& noise, const OutlierDrives* outliers) {
   const std::vector<double> logs = ways_of(data, i, residual, noise, outliers);
-  return logs.empty() ? kNoDensity : log_sum_exp(logs);
+  return logs.empty() ? kNoOutlierDensity : log_sum_exp(logs);
 }
 
 struct Likelihood {
@@ -124,7 +124,7 @@ struct Likelihood {
   const std::vector<bool>& learn;
   const OutlierDrives* like = nullptr;  // no outliers: null
 
-  double nats(const OutlierNoise& noise, const OutlierDrives* outliers) const {
+  double nats(const NoiseEstimate& noise, const OutlierDrives* outliers) const {
     double sum = 0;
     for (std::size_t i = 0; i < data.size(); ++i) {
       if (learn[i]) sum += score_of(data, i, residuals[i], noise, outliers);
@@ -201,7 +201,8 @@ void measure_robot(const OutlierData& data, OutlierDrives* outliers) {
       Eigen::Matrix<double, 3, 2> columns;
       columns << driven * ahead, (left ? -driven : driven) * turn;
       squares += columns.transpose() * columns;
-      product += columns.transpose() * (alike * (left ? data.left[i] : data.right[i]));
+      const ResidualTrial& trial = data.study.trials[i];
+      product += columns.transpose() * (alike * (left ? trial.left : trial.right));
     }
   }
   const Eigen::Vector2d speeds = squares.ldlt().solve(product);
@@ -229,29 +230,29 @@ OutlierFit refit_outliers(const OutlierData& data, const Residuals& residuals,
 }
 
 std::optional<OutlierFit> fit_outliers(const OutlierData& data, const Residuals& residuals,
-                                       const std::vector<bool>& learn, const OutlierNoise& start,
+                                       const std::vector<bool>& learn, const NoiseEstimate& start,
                                        double least_gain) {
   const Likelihood plain{data, residuals, learn};
   Search search = search_from(start, nullptr);
   const double without = climb(plain, kMostEvaluations, &search);
-  const OutlierNoise wide = noise_at(search.x.data());
+  const NoiseEstimate wide = noise_at(search.x.data());
   // Outliers have widened one of these.
-  std::vector<OutlierNoise> noises = {wide, wide, wide};
-  noises[1][0] /= 4;
-  noises[2][0] /= 2;
-  noises[2][1] /= 2;
+  std::vector<NoiseEstimate> noises = {wide, wide, wide};
+  noises[1].drive_common /= 4;
+  noises[2].drive_common /= 2;
+  noises[2].drive_side /= 2;
   OutlierDrives robot;
   measure_robot(data, &robot);
   std::optional<OutlierFit> best;
   for (std::size_t kind = 0; kind < outlier_kind_names().size(); ++kind) {
     OutlierFit first;
-    first.nats = kNoDensity * static_cast<double>(data.size());
+    first.nats = kNoOutlierDensity * static_cast<double>(data.size());
     for (OutlierDrives outliers : first_outliers(static_cast<OutlierKind>(kind))) {
       if (outliers.kind == OutlierKind::kSide) {
         outliers.speed_m_s = robot.speed_m_s;
         outliers.gauge_m = robot.gauge_m;
       }
-      for (const OutlierNoise& noise : noises) {
+      for (const NoiseEstimate& noise : noises) {
         const double nats = plain.nats(noise, &outliers);
         if (nats > first.nats) first = {outliers, noise, nats, 0};
       }

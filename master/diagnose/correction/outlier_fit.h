@@ -4,26 +4,19 @@
 // wider than it is.
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <vector>
 
 #include "common/residual/outliers.h"
 #include "master/diagnose/correction/fit.h"
+#include "master/diagnose/study.h"
 
 namespace gapfarm {
 
-// Standard deviations: the drives' in common, of each side, of a reading's position, its heading.
-using OutlierNoise = std::array<double, 4>;
-
 struct OutlierData {
-  std::vector<LoggedMotion> facts;  // one a trial, as are all of these
+  const Study& study;               // its trials vary by its subject's covariance
+  std::vector<LoggedMotion> facts;  // one a trial
   std::vector<Pose> ends;           // predicted, world frame
-  // Covariance of the end where one source of noise is 1 and the others 0.
-  std::vector<std::array<Eigen::Matrix3d, 4>> covariances;
-  // Change of the end for a unit change of each side's gain, in its own axes.
-  std::vector<Eigen::Vector3d> left, right;
   double outlier_share = 0.02;
 
   std::size_t size() const { return facts.size(); }
@@ -31,7 +24,7 @@ struct OutlierData {
 
 struct OutlierFit {
   OutlierDrives outliers;
-  OutlierNoise noise = {};
+  NoiseEstimate noise;
   double nats = 0;  // over the trials that it learned from
   double gain = 0;  // over the best noise alone
 };
@@ -47,7 +40,7 @@ double outlier_chance(const OutlierData& data, std::size_t trial, const Eigen::V
 // The kind that explains most of the residuals of the trials with learn[i]; none that explains
 // `least_gain` nats: nothing.
 std::optional<OutlierFit> fit_outliers(const OutlierData& data, const Residuals& residuals,
-                                       const std::vector<bool>& learn, const OutlierNoise& start,
+                                       const std::vector<bool>& learn, const NoiseEstimate& start,
                                        double least_gain);
 
 // The same kind, from where it stands for other trials.

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
+#include <memory>
 
+#include "master/diagnose/subject.h"
 #include "tests/unit/residual/fields.h"
 
 namespace gapfarm {
@@ -14,9 +17,10 @@ using tests::DrawnLog;
 
 // As fast and as wide as draw_log()'s robot.
 constexpr double kSpeed_m_s = 0.25, kGauge_m = 0.125;
-constexpr OutlierNoise kTrue = {0.01, 0.015, 0.002, 0.01};
+const NoiseEstimate kTrue = {{0.002, 0.01}, 0.01, 0.015};
 
 struct OutlierLog {
+  std::shared_ptr<Study> study;
   OutlierData data;
   Residuals residuals;
   std::vector<bool> learn;
@@ -31,18 +35,19 @@ OutlierLog draw_outliers(std::uint64_t seed, std::size_t trials, const OutlierDr
   const DrawnLog drives = draw_log(
       seed, trials, [](const auto&, const auto&) { return Eigen::Vector3d::Zero().eval(); });
   Stream stream({.run_seed = seed, .purpose = Purpose::kTest, .birth_id = 1});
+  auto study = std::make_shared<Study>();
+  study->subject = diagnosis_subject(Problem{});
   OutlierLog log{
-      {drives.data.facts, drives.data.ends, {}, {}, {}, 0.02}, {}, std::vector<bool>(trials, true)};
+      study, {*study, drives.data.facts, drives.data.ends}, {}, std::vector<bool>(trials, true)};
   for (std::size_t i = 0; i < trials; ++i) {
     const LoggedMotion& facts = log.data.facts[i];
     const Pose& end = log.data.ends[i];
     const Eigen::Vector3d l = of_side(facts, end, true), r = of_side(facts, end, false);
-    log.data.left.push_back(l);
-    log.data.right.push_back(r);
-    const Eigen::Matrix3d position = Eigen::Vector3d(2, 2, 0).asDiagonal();
-    const Eigen::Matrix3d heading = Eigen::Vector3d(0, 0, 2).asDiagonal();
-    log.data.covariances.push_back(
-        {(l + r) * (l + r).transpose(), l * l.transpose() + r * r.transpose(), position, heading});
+    ResidualTrial& trial = study->trials.emplace_back();
+    trial.X_WS = facts.X_WS;
+    trial.X_WP = end;
+    trial.left = l;
+    trial.right = r;
     Pose went = end;
     if (outliers != nullptr) {
       const double amount = stream.uniform(outliers->least, outliers->most);
@@ -51,19 +56,18 @@ OutlierLog draw_outliers(std::uint64_t seed, std::size_t trials, const OutlierDr
       went = is_outlier ? outlier_end(*outliers, facts, end, amount, first)
                         : rest_end(*outliers, facts, end);
     }
-    const double both = kTrue[0] * stream.normal();
-    const double left = both + kTrue[1] * stream.normal();
-    const double right = both + kTrue[1] * stream.normal();
-    const Eigen::Vector3d reading(kTrue[2] * stream.normal(), kTrue[2] * stream.normal(),
-                                  kTrue[3] * stream.normal());
-    log.residuals.push_back(local_difference(end, went) + left * l + right * r +
-                            std::sqrt(2.0) * reading);
+    const double both = kTrue.drive_common * stream.normal();
+    const double left = both + kTrue.drive_side * stream.normal();
+    const double right = both + kTrue.drive_side * stream.normal();
+    const Eigen::Matrix3d reading = reading_covariance(trial, kTrue.pose).llt().matrixL();
+    const Eigen::Vector3d drawn(stream.normal(), stream.normal(), stream.normal());
+    log.residuals.push_back(local_difference(end, went) + left * l + right * r + reading * drawn);
   }
   return log;
 }
 
 std::optional<OutlierFit> fit(const OutlierLog& log) {
-  return fit_outliers(log.data, log.residuals, log.learn, {0.02, 0.02, 0.003, 0.02}, 11);
+  return fit_outliers(log.data, log.residuals, log.learn, {{0.003, 0.02}, 0.02, 0.02}, 11);
 }
 
 double mean_score(const OutlierLog& log, const OutlierFit& by) {
@@ -92,7 +96,7 @@ TEST(OutlierFit, FindsWhatOutliersAndHowOften) {
     EXPECT_NEAR(found->outliers.most, truth.most, 0.15 + 0.1 * std::abs(truth.most));
     EXPECT_NEAR(found->outliers.rest, truth.rest, 0.02);
     const OutlierFit perfect{truth, kTrue, 0, 0};
-    const OutlierNoise wide = {0.2, 0.05, 0.004, 0.03};
+    const NoiseEstimate wide = {{0.004, 0.03}, 0.2, 0.05};
     OutlierFit none = perfect;
     none.outliers.share = 1e-9;
     none.noise = wide;
