@@ -18,19 +18,10 @@ namespace {
 
 constexpr double kRetuningStep = 0.05;  // of the logarithm
 constexpr int kPushTuningRounds = 4;
-constexpr std::size_t kMostGridTrials = 120;
-constexpr double kGridFactors[] = {0.25, 0.4, 0.55, 0.7, 0.85, 1.0};
-constexpr double kGridPressures[] = {0.4, 0.7, 1.0, 1.6, 3.0, 6.0};
-constexpr double kGridFrictions[] = {0.1, 0.25, 0.45, 0.7};
-// What a coarse grid's points may miss ends by before they count less: of the distance slid, and
-// turned by on the way.
-constexpr double kCoarse_m = 3e-3, kCoarseShare = 0.05;
-constexpr double kCoarse_rad = 0.02, kCoarseTurn_rad_m = 1;
 
 // What says how a piece is supported: the row of all pieces, followed by those of their own.
 struct SupportRows {
   std::size_t of_all = row_of(Push::kShapeFactor);
-  std::span<const double> grid = kGridFactors;
 
   std::size_t own(std::size_t piece) const { return of_all + 1 + piece; }
   bool holds(std::size_t row) const { return row >= of_all && row < own(kOwnShapeFactors); }
@@ -44,7 +35,7 @@ static_assert(row_of(Push::kShapeFactor1) == row_of(Push::kShapeFactor) + 1 &&
 
 SupportRows support_rows(const Problem& problem) {
   if (!rests_on_its_face(problem.values)) return {};
-  return {row_of(Push::kPressure), kGridPressures};
+  return {row_of(Push::kPressure)};
 }
 
 // The rows that tuning moves.
@@ -149,74 +140,6 @@ Status measure_retuning(Predictor& predictor, Study* study) {
   return {};
 }
 
-constexpr double kNotSimulated = 1e6;  // a trial, beside coarse_cost()
-
-double coarse_cost(const ResidualTrial& t, const Pose& end) {
-  const double slid = std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y);
-  const Eigen::Vector3d d = local_difference(end, t.X_WE);
-  const double aside = d.head<2>().norm() / std::hypot(kCoarse_m, kCoarseShare * slid);
-  const double turned = d[2] / std::hypot(kCoarse_rad, kCoarseTurn_rad_m * slid);
-  return std::sqrt(1 + aside * aside + turned * turned);
-}
-
-// The best point of a grid: a friction for all pieces, a factor for each.
-Status start_from_grid(Predictor& predictor, Study* study) {
-  PredictionRequest some;
-  const std::size_t count = std::min(kMostGridTrials, study->size());
-  for (std::size_t i = 0; i < count; ++i) {
-    some.trials.push_back(static_cast<std::uint32_t>(i * study->size() / count));
-  }
-  const auto tuned = [&](std::size_t row) { return study->base.count(row) > 0; };
-  std::vector<double> frictions = {predictor.problem().values[row_of(Push::kFingerFriction)]};
-  if (tuned(row_of(Push::kFingerFriction))) {
-    frictions.insert(frictions.end(), std::begin(kGridFrictions), std::end(kGridFrictions));
-  }
-  const SupportRows support = support_rows(predictor.problem());
-  const bool factors_tuned = std::ranges::any_of(
-      study->base, [&](const auto& entry) { return support.holds(entry.first); });
-  std::vector<double> factors = {0};  // the config's
-  if (factors_tuned) factors.insert(factors.end(), support.grid.begin(), support.grid.end());
-  if (frictions.size() * factors.size() == 1) return {};
-  std::vector<PredictionRequest> requests;
-  for (double friction : frictions) {
-    for (double factor : factors) {
-      some.at = study->base;
-      for (auto& [row, value] : some.at) {
-        if (support.holds(row) && factor > 0) value = factor;
-      }
-      if (tuned(row_of(Push::kFingerFriction))) some.at[row_of(Push::kFingerFriction)] = friction;
-      requests.push_back(some);
-    }
-  }
-  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
-  double least = INFINITY;
-  for (std::size_t f = 0; f < frictions.size(); ++f) {
-    std::map<std::size_t, std::vector<double>> costs;  // by piece: of each factor
-    for (std::size_t s = 0; s < factors.size(); ++s) {
-      for (std::size_t j = 0; j < some.trials.size(); ++j) {
-        const ResidualTrial& t = study->trials[some.trials[j]];
-        std::vector<double>& own = costs[t.command];
-        own.resize(factors.size());
-        const auto& simulated = ends[f * factors.size() + s];
-        own[s] += simulated ? coarse_cost(t, (*simulated)[j]) : kNotSimulated;
-      }
-    }
-    double sum = 0;
-    Overrides at = requests[f * factors.size()].at;
-    for (const auto& [piece, own] : costs) {
-      const auto best = static_cast<std::size_t>(std::ranges::min_element(own) - own.begin());
-      sum += own[best];
-      const std::size_t to = at.count(support.own(piece)) ? support.own(piece) : support.of_all;
-      if (factors[best] > 0 && at.count(to)) at[to] = factors[best];
-    }
-    if (sum < least) {
-      least = sum;
-      study->base = at;
-    }
-  }
-  return {};
-}
-
 }  // namespace
 
 Eigen::Vector3d from_push_axes(const ResidualTrial& trial, const Eigen::Vector3d& shift) {
@@ -284,9 +207,6 @@ Result<Study> make_push_study(const Problem& problem, std::span<const Gene> gene
 }
 
 Status tune_push_base(Predictor& predictor, bool keep, Study* study) {
-  if (!keep) {
-    if (Status s = start_from_grid(predictor, study); !s) return s;
-  }
   // Twice: how a start's noise spreads depends on the base, which is fitted to what it leaves.
   for (int round = 0; round < 2; ++round) {
     ASSIGN_OR_RETURN(auto ends, predictor.ends({{study->base, {}}}));

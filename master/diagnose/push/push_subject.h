@@ -21,7 +21,7 @@ DiagnosisSubject push_subject();
 // finger friction.  A shared shape factor becomes one a piece when the log has several.
 // Errors: an empty log, more pieces than can have a shape factor of their own.
 Result<Study> make_push_study(const Problem& problem, std::span<const Gene> genes);
-// From the best of a coarse grid, robust Gauss-Newton.
+// From the config's values, robust Gauss-Newton.
 Status tune_push_base(Predictor& predictor, bool keep, Study* study);
 // Start noise through the simulation, end noise, and the piece's own, which grows as it slides.
 Eigen::Matrix3d push_covariance(const ResidualTrial& trial, const NoiseEstimate& noise);
