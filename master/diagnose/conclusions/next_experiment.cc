@@ -186,10 +186,6 @@ NextExperiment hopeless(const std::vector<Pair>& pairs, const ExperimentPlan& pl
           names_in(pairs, alternatives), 0};
 }
 
-void erase(const std::vector<Pair>& done, std::vector<Pair>& pairs) {
-  std::erase_if(pairs, [&](const Pair& pair) { return contains(done, pair); });
-}
-
 }  // namespace
 
 double divergence(const PredictedEnd& a, const PredictedEnd& b) {
@@ -237,7 +233,7 @@ Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const Experimen
     }
     used.insert(plan.designs[choice->design].group);
     next.push_back(sentence(*choice, plan, alternatives));
-    erase(choice->pairs, open);
+    std::erase_if(open, [&](const Pair& pair) { return contains(choice->pairs, pair); });
   }
   return next;
 }

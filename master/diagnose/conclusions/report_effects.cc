@@ -55,10 +55,9 @@ Deviation deviation_of(const JointFit& fit, const Study& study, const Eigen::Mat
 Deviation deviation_of(const Refit& refit, std::size_t row) {
   const Explanation& named = refit.judged.named;
   const NestedFit& last = refit.nested.back();
-  const Eigen::MatrixXd none(3 * last.study.size(), 0);
   const Deviation held =
       deviation_of(*named.estimates, named.study(), named.evidence->nuisances, row);
-  const Deviation free = deviation_of(last.fit, last.study, none, row);
+  const Deviation free = deviation_of(last.fit, last.study, no_nuisances(last.study), row);
   const double scale = std::sqrt(refit.judged.scale);
   return {std::max(held.least * scale, free.least), std::max(held.fitted * scale, free.fitted)};
 }

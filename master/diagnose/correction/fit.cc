@@ -7,6 +7,7 @@
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/correction/basis.h"
+#include "master/infer/compete.h"
 
 namespace gapfarm {
 namespace {
@@ -154,14 +155,8 @@ double gain_at(const std::vector<Crossing>& drives, double edge) {
 }  // namespace
 
 bool gains_significantly(const std::vector<double>& gains) {
-  double sum = 0, squares = 0;
-  for (const double g : gains) {
-    sum += g;
-    squares += g * g;
-  }
-  const auto n = static_cast<double>(gains.size());
-  const double variance = std::max(0.0, squares / n - (sum / n) * (sum / n));
-  return sum / n > kNormal90 * std::sqrt(variance / n);
+  const auto [sum, se] = infer::paired_gain(gains, std::vector<double>(gains.size(), 0));
+  return sum > kNormal90 * se;
 }
 
 std::size_t ResidualData::folds() const {

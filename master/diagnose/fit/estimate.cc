@@ -149,18 +149,25 @@ Eigen::VectorXd weights_of(const Study& study, const JointFit& fit, const Eigen:
   return weight;
 }
 
+// The fit's parameters first, then what the nuisances take.
+StepEquations equations_of(const Study& study, const JointFit& fit,
+                           const Eigen::MatrixXd& nuisances, const Eigen::VectorXd& weight) {
+  Eigen::MatrixXd all(fit.jacobian.rows(), fit.jacobian.cols() + nuisances.cols());
+  all << fit.jacobian, nuisances;
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * all;
+  StepEquations normal{all.transpose() * weighted,
+                       weighted.transpose() * study.whiten(fit.residuals)};
+  normal.matrix.diagonal().tail(nuisances.cols()).array() += 1;
+  add_prior(study, fit, &normal);
+  return normal;
+}
+
 // One step, with bounded weights for trials far out; fills in the standard errors.
 void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nuisances,
           JointFit* fit) {
   const Eigen::Index p = fit->jacobian.cols(), q = nuisances.cols();
-  Eigen::MatrixXd all(fit->jacobian.rows(), p + q);
-  all << fit->jacobian, nuisances;
-  const Eigen::VectorXd z = study.whiten(fit->residuals);
-  const Eigen::VectorXd weight = weights_of(study, *fit, z);
-  StepEquations normal{all.transpose() * weight.asDiagonal() * all,
-                       all.transpose() * weight.asDiagonal() * z};
-  normal.matrix.diagonal().tail(q).array() += 1;
-  add_prior(study, *fit, &normal);
+  const Eigen::VectorXd weight = weights_of(study, *fit, study.whiten(fit->residuals));
+  const StepEquations normal = equations_of(study, *fit, nuisances, weight);
   const Eigen::MatrixXd inverse = inverse_of_symmetric(normal.matrix);
   Eigen::VectorXd lower = Eigen::VectorXd::Constant(p + q, -INFINITY), upper = -lower;
   for (Eigen::Index k = 0; k < p; ++k) {
@@ -218,14 +225,6 @@ Result<Moved> moved_on(Predictor& predictor, const Study& study, const Eigen::Ma
   return next;
 }
 
-StepEquations equations_of(const Study& study, const JointFit& fit, const Eigen::VectorXd& z,
-                           const Eigen::VectorXd& weight) {
-  const Eigen::MatrixXd weighted = weight.asDiagonal() * fit.jacobian;
-  StepEquations normal{fit.jacobian.transpose() * weighted, weighted.transpose() * z};
-  add_prior(study, fit, &normal);
-  return normal;
-}
-
 // To the parameters that fit without fold `f`, to first order.
 Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
                              const std::vector<std::size_t>& fold_of, std::size_t f) {
@@ -235,11 +234,13 @@ Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
   for (std::size_t i = 0; i < study.size() && !only; ++i) {
     if (fold_of[i] == f) weight.segment<3>(static_cast<Eigen::Index>(3 * i)).setZero();
   }
-  const StepEquations normal = equations_of(study, fit, z, weight);
+  const StepEquations normal = equations_of(study, fit, no_nuisances(study), weight);
   return solve_symmetric(normal.matrix, normal.right);
 }
 
 }  // namespace
+
+Eigen::MatrixXd no_nuisances(const Study& study) { return Eigen::MatrixXd(3 * study.size(), 0); }
 
 bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); }
 
@@ -255,8 +256,8 @@ void add_base_prior(const Study& study, const JointFit& fit, Eigen::MatrixXd* in
 }
 
 StepEquations step_equations(const Study& study, const JointFit& fit) {
-  const Eigen::VectorXd z = study.whiten(fit.residuals);
-  return equations_of(study, fit, z, weights_of(study, fit, z));
+  return equations_of(study, fit, no_nuisances(study),
+                      weights_of(study, fit, study.whiten(fit.residuals)));
 }
 
 void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* fit) {
@@ -352,18 +353,15 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
 
 std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
                                                 const std::vector<std::size_t>& fold_of) {
-  if (fit.jacobian.cols() == 0) return fit.residuals;
+  std::vector<Eigen::Vector3d> held_out = fit.residuals;
   const std::size_t folds = 1 + *std::max_element(fold_of.begin(), fold_of.end());
-  Eigen::VectorXd left = study.whiten(fit.residuals);
   for (std::size_t f = 0; f < folds; ++f) {
-    const Eigen::VectorXd delta = step_without(study, fit, fold_of, f);
+    const std::vector<Eigen::Vector3d> left = left_without(study, fit, fold_of, f);
     for (std::size_t i = 0; i < study.size(); ++i) {
-      if (fold_of[i] != f) continue;
-      const auto at = static_cast<Eigen::Index>(3 * i);
-      left.segment<3>(at) -= fit.jacobian.middleRows(at, 3) * delta;
+      if (fold_of[i] == f) held_out[i] = left[i];
     }
   }
-  return study.unwhiten(left);
+  return held_out;
 }
 
 std::vector<Eigen::Vector3d> left_without(const Study& study, const JointFit& fit,

@@ -42,6 +42,9 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds,
                              Loss loss = Loss::kHuber);
 
+// As such: no columns.
+Eigen::MatrixXd no_nuisances(const Study& study);
+
 // Standard deviation of a fitted base parameter's prior, in its own unit.
 double prior_sd(const Study& study, const BaseParameter& p);
 // What that says of them, beside what the log does.

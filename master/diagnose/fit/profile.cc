@@ -39,7 +39,7 @@ class Profile {
       : predictor_(predictor),
         study_(study),
         fit_(fit),
-        none_(3 * study.size(), 0),
+        none_(no_nuisances(study)),
         inverse_(inverse_of_symmetric(step_equations(study, fit).matrix)),
         misfit_(misfit_of(study, fit, none_)) {}
 
@@ -151,9 +151,8 @@ Result<JointFit> profiled(Predictor& predictor, const Study& study,
     if (lower == nullptr || moved == kMostMoves) break;
     fit = JointFit(*lower);
   }
-  const Eigen::MatrixXd none(3 * study.size(), 0);
   ASSIGN_OR_RETURN(fit, fit_jointly(predictor, study, effects, fit.at, BaseParameters::kFitted,
-                                    none, kFitRounds, Loss::kRedescending));
+                                    no_nuisances(study), kFitRounds, Loss::kRedescending));
   for (std::size_t k = 0; k < bent.size(); ++k) {
     fit.parameters[k].bent = bent[k];
     fit.parameters[k].standard_error *= bent[k];

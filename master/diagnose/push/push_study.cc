@@ -214,9 +214,9 @@ Status tune_push_base(Predictor& predictor, bool keep, Study* study) {
     if (Status s = measure_spread(predictor, study); !s) return s;
     study->use_noise(study->noise);
     if (keep || round == 1) break;
-    const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study->size()), 0);
-    ASSIGN_OR_RETURN(auto fit, fit_jointly(predictor, *study, {}, study->base,
-                                           BaseParameters::kFitted, none, kPushTuningRounds));
+    ASSIGN_OR_RETURN(auto fit,
+                     fit_jointly(predictor, *study, {}, study->base, BaseParameters::kFitted,
+                                 no_nuisances(*study), kPushTuningRounds));
     study->base = fit.at;
   }
   return measure_retuning(predictor, study);

@@ -15,8 +15,6 @@
 namespace gapfarm::steps {
 namespace {
 
-Eigen::MatrixXd no_nuisances(const Study& study) { return Eigen::MatrixXd(3 * study.size(), 0); }
-
 // `scored_in`: by its noise, where the fit had another.
 NestedFit nested_fit(const DiagnosisRequest& of, std::string name, JointFit fit,
                      const Study& fitted_in, Study scored_in,

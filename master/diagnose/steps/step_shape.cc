@@ -13,6 +13,7 @@
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
+#include "master/infer/compete.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -185,10 +186,8 @@ Refit add_shape(const DiagnosisRequest& of, const Refit& refit) {
     return with;
   const auto n = static_cast<double>(tried.with_it.size());
   const std::vector<double> gains = gains_over(tried.with_it, tried.without_it);
-  const double gained = mean(gains);
-  double squares = 0;
-  for (const double g : gains) squares += (g - gained) * (g - gained);
-  const double half = kNormal90 * std::sqrt(squares) / n;
+  const auto [sum, se] = infer::paired_gain(tried.with_it, tried.without_it);
+  const double gained = sum / n, half = kNormal90 * se / n;
   // The noise that passed for the floor had the outliers in it.
   if (tried.residual.outliers) with.floor = std::max(refit.floor, mean(tried.with_it));
   const ClosedShare closed = closed_share(of, with, gains);
