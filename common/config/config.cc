@@ -131,6 +131,11 @@ Result<Config> parse(std::string_view text, const std::string& path, const Progr
     return text_error(path, {}, "a model", "a config",
                       "predict and simulate take models; evolving needs a config");
   }
+  if (parsed->contains("drive")) {
+    return text_error(
+        path, {}, "a robot's file", "a config",
+        "gapfarm robot " + path + " --out COPY --config CONFIG --runs FOLDER writes one");
+  }
   Config config;
   config.path = path;
   config.text = text;

@@ -265,6 +265,7 @@ TEST(Config, NamesWhatIsNotAConfig) {
   EXPECT_THAT(error_of("session,trial,t,command,left,right\n"),
               HasSubstr("found a trial log, expected a config"));
   EXPECT_THAT(error_of("model = 1\n"), HasSubstr("found a model, expected a config"));
+  EXPECT_THAT(error_of("drive = \"omni\"\n"), HasSubstr("found a robot's file, expected a config"));
   const auto missing = read_config("/nowhere/c.toml");
   ASSERT_FALSE(missing.ok());
   EXPECT_THAT(missing.error().message, HasSubstr("/nowhere/c.toml: no such file"));
