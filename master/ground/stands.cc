@@ -76,14 +76,16 @@ GroundNames with_names(const WindowFitter& fitter, const GroundWork& work,
   return again;
 }
 
-// Where the log is sure that it closes more than is tolerated: robots that nobody touched have a
-// little of it.
+// A smooth correction of a prediction, where the log is sure that it closes more than is tolerated
+// beyond that and beyond all that `values` explain: robots that nobody touched have a little of it.
 std::optional<FreeResidual> sure_correction(const WindowFitter& fitter, const GroundWork& work,
-                                            const WindowFit& held_out) {
+                                            const WindowFit& held_out, const WindowFit& values) {
   std::optional<FreeResidual> smooth = fit_free_residual(fitter, held_out);
-  if (!smooth) return {};
-  const HeldOutGain gain = held_out_gain(fitter.windows(), smooth->held_out, held_out, work.seed);
-  return gain.lo > kToleratedGap ? smooth : std::nullopt;
+  const auto closes = [&](const WindowFit& before) {
+    const HeldOutGain gain = held_out_gain(fitter.windows(), smooth->held_out, before, work.seed);
+    return gain.lo > kToleratedGap;
+  };
+  return smooth && closes(held_out) && closes(values) ? smooth : std::nullopt;
 }
 
 // Takes away names that do not stand, one after the other: `stands` says so of each, beside what
@@ -123,13 +125,16 @@ void drop_again(const WindowFitter& fitter, const GroundWork& work, const Ground
 void drop_stand_ins(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
                     GroundSearch* search) {
   if (search->reference) return;  // what both logs have is no change
-  search->smooth = sure_correction(fitter, work, search->chain.back());
+  std::vector<FitRow> all = search->fit.rows;
+  for (FitRow& row : all) row.free = true;
+  const WindowFit values = fit_held_out(fitter, all, search->fit.values);
+  search->smooth = sure_correction(fitter, work, search->chain.back(), values);
   if (!search->smooth) return;
   const auto gain = [&](const WindowFit& with, const WindowFit& without) {
     return held_out_gain(search->windows, with, without, work.seed);
   };
   const auto stands = [&](const GroundStep& step, const GroundNames& others) {
-    auto without = sure_correction(fitter, work, others.chain.back());
+    auto without = sure_correction(fitter, work, others.chain.back(), values);
     if (!without) return true;
     // Of what acts in the world a correction by place says the same in more numbers.
     if (without->of_world && search->catalogue[step.chosen].of_world) return true;

@@ -36,8 +36,7 @@ TEST_P(OutsideCatalogue, IsUnknownAndSaysWhatItDependsOn) {
 INSTANTIATE_TEST_SUITE_P(
     Motors, OutsideCatalogue,
     testing::Values(Outside{"limit", [](double c) { return std::min(c, 6.0); }, true},
-                    Outside{"threshold", [](double c) { return std::abs(c) < 3 ? 0 : c; }, false},
-                    Outside{"coarse", [](double c) { return 2 * std::round(c / 2); }, false}),
+                    Outside{"threshold", [](double c) { return std::abs(c) < 3 ? 0 : c; }, false}),
     [](const auto& of) { return std::string(of.param.what); });
 
 }  // namespace
