@@ -11,16 +11,20 @@
 namespace gapfarm {
 namespace {
 
+// `model_error` of friction: what strengths are off by on logs of another simulator, which has laws
+// of its own (scripts/foreign_pushes.sh; two or three logs an effect).
 std::vector<EffectDiagnosis> push_rows() {
   return {
       {.effect = "friction_anisotropy",
        .searched = {{"ratio", 0.2}},
        .polar = Polar{"friction_anisotropy.ratio", "friction_anisotropy.direction", 2, true},
+       .model_error = 0.9,
        .phrases =
            {"Friction across the table's grain is %1 times that along it, and the grain runs at %2",
             {{"ratio", 1, ""}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "friction_speed",
        .searched = {{"slope", 2}},
+       .model_error = 0.08,
        .phrases = {"Friction with the table grows by %1 of itself with every m/s",
                    {{"slope", 100, " %"}}}},
       {.effect = kPatchEffect,
@@ -34,6 +38,7 @@ std::vector<EffectDiagnosis> push_rows() {
       {.effect = "table_tilt",
        .searched = {{"angle", 0.03}},
        .polar = Polar{"table_tilt.angle", "table_tilt.direction", 1, false},
+       .model_error = 0.6,
        .phrases = {"The table falls by %1 toward %2",
                    {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "com_offset",
@@ -45,6 +50,7 @@ std::vector<EffectDiagnosis> push_rows() {
       {.effect = "pressure_distribution",
        .searched = {{"stretch", 0.15}},
        .polar = Polar{"pressure_distribution.stretch", "pressure_distribution.direction", 2, false},
+       .model_error = 0.06,
        .phrases = {"The support under the piece is drawn out by %1 (logarithm of its length over "
                    "its width) at %2 in the piece",
                    {{"stretch", 1, ""}, {"direction", kDegrees, " degrees"}}}},
