@@ -266,6 +266,11 @@ void GroundReport::trials() {
     const Eigen::Vector3d s = fit.scales[search_.windows.horizon[i]];
     return Eigen::Matrix3d(s.cwiseProduct(s).asDiagonal());
   };
+  d_.shown = {{"left_speed", "speed of the left side, m/s", "left side"},
+              {"right_speed", "speed of the right side, m/s", "right side"},
+              {"ahead", "speed ahead, m/s", "speed ahead"},
+              {"turn", "rate of turning, rad/s", "rate of turning"}};
+  const std::vector<WindowSpeeds> speeds = window_speeds(fitter_, search_.chain.back());
   const auto tuned = fitter_.raw_residuals(search_.chain.front());
   const auto last = fitter_.raw_residuals(search_.chain.back());
   for (std::size_t i = 0; i < search_.windows.trials.size(); ++i) {
@@ -282,21 +287,16 @@ void GroundReport::trials() {
     t.held_out = true;
     t.X_WS = from.X_WS;
     t.measured = between(from.X_WS, from.X_WE);
-    // The prediction is where the measured end lies off by the residual.
-    const auto predicted = [&](const Eigen::Vector3d& r) {
-      const double theta = t.measured.theta - r[2];
-      const double c = std::cos(theta), s = std::sin(theta);
-      return Pose{t.measured.x - c * r[0] + s * r[1], t.measured.y - s * r[0] - c * r[1],
-                  wrap_angle(theta)};
-    };
     t.tuned_residual = tuned[i];
     t.final_residual = last[i];
-    t.tuned = predicted(t.tuned_residual);
-    t.final_ = predicted(t.final_residual);
+    t.tuned = between(from.X_WS, expected_end(from, t.tuned_residual));
+    t.final_ = between(from.X_WS, expected_end(from, t.final_residual));
     t.tuned_cov = cov_of(search_.chain.front(), i);
     t.final_cov = cov_of(search_.chain.back(), i);
     t.tuned_score = search_.chain.front().nats[i];
     t.final_score = search_.chain.back().nats[i];
+    const WindowSpeeds& v = speeds[i];
+    t.covariates = {v.left_m_s, v.right_m_s, v.ahead_m_s, v.turn_rad_s};
     d_.trials.push_back(std::move(t));
   }
 }

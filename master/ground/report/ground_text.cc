@@ -318,6 +318,10 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const Where& a, const Where& b) { return a.share > b.share; });
+  if (search.smooth && !found.empty()) {
+    found.front().covariate = search.smooth->covariate;
+    found.front().text += " It varies with this: " + search.smooth->covariate + ".";
+  }
   return found;
 }
 
@@ -372,9 +376,11 @@ std::string further_values(const GroundSearch& search, const std::vector<Reporte
 std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
   if (!search.faults.empty()) return search.catalogue[search.faults[0].hypothesis].remedy;
   if (diagnosis.effects.empty()) {
-    return diagnosis.verdict == Verdict::kNone
-               ? "Keep what you have; only more runs, or other drives, could show more."
-               : "Look first at the windows that miss most, below.";
+    if (diagnosis.verdict == Verdict::kNone) {
+      return "Keep what you have; only more runs, or other drives, could show more.";
+    }
+    return search.smooth ? "Look at how errors vary with the " + search.smooth->covariate + "."
+                         : "Look first at the windows that miss most, below.";
   }
   if (search.reference) return "Put right what changed, or fit the robot anew from then on.";
   if (search.windows.simulated) return "Give these values to the program.";

@@ -39,15 +39,16 @@ const COVARIATES = [
   { key: "session", label: "session", matches: /session/, of: (t) => t.session_index },
 ];
 
-// What a diagnosis of something else than driven commands brings of its own.
-const PICTURES = PAGE.pictures;
+// What a diagnosis brings of its own; of something else than driven motions, in place of these.
+const PICTURES = PAGE.pictures?.x ? PAGE.pictures : undefined;
+const SHOWN = (PAGE.pictures?.shown ?? []).map(({ key, label, matches }) => (
+  { key, label, matches: new RegExp(matches), of: (t) => t[key] }));
 if (PICTURES) {
   COMPONENT.x = PICTURES.x;
   COMPONENT.y = PICTURES.y;
-  const plain = COVARIATES.filter((c) => c.key === "session");
-  COVARIATES.splice(0, COVARIATES.length, ...PICTURES.shown.map(({ key, label, matches }) => (
-    { key, label, matches: new RegExp(matches), of: (t) => t[key] })), ...plain);
+  COVARIATES.splice(0, COVARIATES.length, ...COVARIATES.filter((c) => c.key === "session"));
 }
+COVARIATES.unshift(...SHOWN);
 
 const covariateOf = (text) => (text ? COVARIATES.find((c) => c.matches.test(text.toLowerCase())) : undefined);
 

@@ -31,6 +31,9 @@ TEST_P(OutsideCatalogue, IsUnknownAndSaysWhatItDependsOn) {
   ASSERT_FALSE(d.findings.empty());
   EXPECT_NE(d.findings.front().find("a correction by"), std::string::npos) << d.findings.front();
   EXPECT_NE(d.findings.front().find("speeds"), std::string::npos) << d.findings.front();
+  // What the report's pictures are drawn against at first.
+  ASSERT_FALSE(d.where.empty());
+  EXPECT_NE(d.where.front().covariate.find("side's speed"), std::string::npos);
 }
 
 INSTANTIATE_TEST_SUITE_P(
