@@ -140,10 +140,12 @@ TEST_F(LongCommands, StudiesOfPathsGoOnAndForgetThePaths) {
 
 TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
   const std::string out = folder_ / "diagnosis";
-  const std::vector<std::string> arguments = {"diagnose",  GAPFARM_SOURCE_DIR "/configs/srv1.toml",
-                                              "--trials",  kDemoLog,
-                                              "--out",     out,
-                                              "--workers", "1"};
+  std::string fine = text_of(GAPFARM_SOURCE_DIR "/configs/srv1.toml");
+  const std::string coarse_steps = "step_rate = 120 ";
+  fine.replace(fine.find(coarse_steps), coarse_steps.size(), "step_rate = 960 ");  // some seconds
+  const std::vector<std::string> arguments = {
+      "diagnose", folder_.write("fine.toml", fine), "--trials", kDemoLog, "--out", out, "--workers",
+      "1"};
   const auto status = [&] { return status_of(out); };
   {
     RunningProgram diagnose("gapfarm", arguments);
@@ -151,6 +153,7 @@ TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
       const auto seen = record(out);
       return seen && seen->simulated > 0 && seen->time_left_s;
     })) << diagnose.err();
+    diagnose.send(SIGSTOP);  // it may end before all is looked at
     const Json live = status();
     EXPECT_EQ(live["state"], "running");
     EXPECT_EQ(live["command"], "diagnose");
@@ -173,8 +176,10 @@ TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
   // The second one waits in vain for the first one's folder.
   RunningProgram again("gapfarm", arguments);
   ASSERT_TRUE(wait_until([&] { return status()["state"] == "running"; }));
+  again.send(SIGSTOP);
   EXPECT_THAT(gapfarm_command(arguments).err, HasSubstr("in use by process"));
   again.send(SIGINT);
+  again.send(SIGCONT);
   EXPECT_EQ(again.wait().exit_code, kStopped);
   EXPECT_THAT(text_of(out + "/log.txt"),
               AllOf(HasSubstr("diagnose: stage 1 of 6"), HasSubstr("the same command goes on")));
