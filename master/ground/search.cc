@@ -287,8 +287,7 @@ bool moved_far(const WindowFitter& fitter, const WindowFit& fit) {
 
 // What everything that was tried would still close.
 void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
-  std::vector<FitRow> all = search->fit.rows;
-  for (FitRow& row : all) row.free = true;
+  const std::vector<FitRow> all = all_free(search->fit.rows);
   search->free_fit = fitter.fit(all, {}, search->fit.values);
   WindowFit moved = fit_held_out(fitter, search->fit.rows, search->fit.values);
   const WindowFit named = search->chain.back();

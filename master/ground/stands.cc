@@ -125,9 +125,7 @@ void drop_again(const WindowFitter& fitter, const GroundWork& work, const Ground
 void drop_stand_ins(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
                     GroundSearch* search) {
   if (search->reference) return;  // what both logs have is no change
-  std::vector<FitRow> all = search->fit.rows;
-  for (FitRow& row : all) row.free = true;
-  const WindowFit values = fit_held_out(fitter, all, search->fit.values);
+  const WindowFit values = fit_held_out(fitter, all_free(search->fit.rows), search->fit.values);
   search->smooth = sure_correction(fitter, work, search->chain.back(), values);
   if (!search->smooth) return;
   const auto gain = [&](const WindowFit& with, const WindowFit& without) {

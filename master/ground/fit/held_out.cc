@@ -35,6 +35,11 @@ double weighted(const std::vector<double>& values, const std::vector<double>& ti
   return sum;
 }
 
+// Whether each block is held out with this fold.
+std::vector<char> out_with(int fold, const std::vector<int>& folds) {
+  return mapped(folds, [&](int of_block) { return static_cast<char>(of_block == fold); });
+}
+
 HeldOutGain with_interval(double mean, std::vector<double> drawn) {
   const auto [lo, hi] = ninety_percent_of(std::move(drawn));
   return {mean, lo, hi};
@@ -67,8 +72,7 @@ std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
   const std::vector<int> folds = held_out_folds(fitter.windows());
   std::vector<WindowFit> parts;
   for (int fold = 0; fold < kFolds; ++fold) {
-    std::vector<char> out(folds.size(), 0);
-    for (std::size_t b = 0; b < folds.size(); ++b) out[b] = folds[b] == fold;
+    const std::vector<char> out = out_with(fold, folds);
     parts.push_back(rows.empty() ? fitter.hold(rows, start, out) : fitter.fit(rows, out, start, 6));
   }
   return parts;
@@ -93,8 +97,7 @@ WindowFit judge_held_out(const WindowFitter& fitter, WindowFit fit,
   const std::vector<int> folds = held_out_folds(fitter.windows());
   WindowFit judged = fitter.judge(fit, raw);
   for (int fold = 0; fold < kFolds; ++fold) {
-    std::vector<char> out(folds.size(), 0);
-    for (std::size_t b = 0; b < folds.size(); ++b) out[b] = folds[b] == fold;
+    const std::vector<char> out = out_with(fold, folds);
     const WindowFit part = fitter.judge(fit, raw, out);
     for (std::size_t i = 0; i < part.nats.size(); ++i) {
       if (out[fitter.windows().block[i]]) judged.nats[i] = part.nats[i];

@@ -29,6 +29,9 @@ Eigen::Index row_index(const std::vector<FitRow>& rows, std::string_view name);
 // Each within its tolerance.
 std::vector<FitRow> held_rows(const std::vector<KinematicRow>& rows);
 
+// None within its tolerance.
+std::vector<FitRow> all_free(std::vector<FitRow> rows);
+
 // Where they stand as long as no log has its say.
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows);
 

@@ -71,6 +71,11 @@ Eigen::Index WindowFitter::in_reference(const FitRow& row) const {
   return !reference_ ? -1 : reference_->index(row.row.name);
 }
 
+std::vector<FitRow> all_free(std::vector<FitRow> rows) {
+  for (FitRow& row : rows) row.free = true;
+  return rows;
+}
+
 double prior_deviation(const FitRow& row) {
   if (!row.free) return row.row.tolerance;
   return row.row.farthest > 0 ? row.row.farthest : plausible_error(row.row);
