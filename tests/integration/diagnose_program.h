@@ -12,6 +12,16 @@
 
 namespace gapfarm {
 
+// configs/NAME, which simulates at 120 Hz, at another rate: tests need not be as slow, or quick.
+inline std::string shipped_config(const std::string& name, int step_rate_hz) {
+  std::string text = text_of(std::string(GAPFARM_SOURCE_DIR) + "/configs/" + name);
+  const std::string rate = "step_rate = 120";
+  const std::size_t at = text.find(rate);
+  EXPECT_NE(at, text.npos) << name;
+  if (at == text.npos) return text;
+  return text.replace(at, rate.size(), "step_rate = " + std::to_string(step_rate_hz));
+}
+
 // A log of so many trials with these effects ("effect.key=value").
 inline void simulate_log(const std::string& config, const std::string& log, int trials,
                          const std::vector<std::string>& set, const std::string& seed = "3") {

@@ -103,10 +103,7 @@ TEST_F(DiagnosePushes, WhatPredictsNothingKeepsNoOtherFromBeingFound) {
                                       "camera_distortion.x=0.5", "camera_distortion.y=0.5"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   // At half the rate of steps, and without all but the two: five minutes less.
-  std::string config = text_of(GAPFARM_SOURCE_DIR "/configs/push.toml");
-  const std::string rate = "step_rate = 120";
-  ASSERT_NE(config.find(rate), std::string::npos);
-  config.replace(config.find(rate), rate.size(), "step_rate = 60");
+  const std::string config = shipped_config("push.toml", 60);
   const Json d =
       diagnose_log(folder_.write("c.toml", config), folder_ / "trials.csv", folder_ / "d",
                    {"--exclude", "friction_anisotropy", "friction_speed", "table_tilt",
@@ -125,10 +122,7 @@ TEST_F(DiagnosePushes, AScaleIsNotNamedAnAspect) {
   const Finished made =
       run_program("planar_push_log", {folder_.path().string(), "136", "pose_scale.ratio=1.06"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
-  std::string config = text_of(GAPFARM_SOURCE_DIR "/configs/push.toml");
-  const std::string rate = "step_rate = 120";
-  ASSERT_NE(config.find(rate), std::string::npos);
-  config.replace(config.find(rate), rate.size(), "step_rate = 60");
+  const std::string config = shipped_config("push.toml", 60);
   const Json d =
       diagnose_log(folder_.write("c.toml", config), folder_ / "trials.csv", folder_ / "d",
                    {"--exclude", "friction_anisotropy", "friction_speed", "friction_patch",

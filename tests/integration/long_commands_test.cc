@@ -7,6 +7,7 @@
 
 #include "master/store/command_record.h"
 #include "tests/integration/demo_config.h"
+#include "tests/integration/diagnose_program.h"
 #include "tests/integration/run_program.h"
 
 namespace gapfarm::long_commands_test {
@@ -140,9 +141,7 @@ TEST_F(LongCommands, StudiesOfPathsGoOnAndForgetThePaths) {
 
 TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
   const std::string out = folder_ / "diagnosis";
-  std::string fine = text_of(GAPFARM_SOURCE_DIR "/configs/srv1.toml");
-  const std::string coarse_steps = "step_rate = 120 ";
-  fine.replace(fine.find(coarse_steps), coarse_steps.size(), "step_rate = 960 ");  // some seconds
+  const std::string fine = shipped_config("srv1.toml", 960);  // takes some seconds
   const std::vector<std::string> arguments = {
       "diagnose", folder_.write("fine.toml", fine), "--trials", kDemoLog, "--out", out, "--workers",
       "1"};
