@@ -252,9 +252,7 @@ PairedGain paired_gain(const std::vector<double>& with, const std::vector<double
 
 PairedGain gain_over(const Model& with, const Model& without, Eigen::Index common) {
   PairedGain gain = paired_gain(with.held_out, without.held_out);
-  const auto price = [&](const Model& m) {
-    return 0.5 * m.space.prior().head(common).dot(m.fit.u.head(common).cwiseAbs2());
-  };
+  const auto price = [&](const Model& m) { return m.space.price(m.fit.u, common); };
   gain.sum += price(without) - price(with);
   return gain;
 }

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/math/algebra.h"
+#include "common/math/statistics.h"
 
 namespace gapfarm::infer {
 namespace {
@@ -14,39 +16,67 @@ constexpr int kMostHalvings = 3;
 constexpr double kFirstDifference = 0.2;  // of a coordinate
 constexpr double kLeastDifference = 0.01, kMostDifference = 1.5;
 constexpr double kLeastDamping = 1e-3;
+constexpr double kFar = 4;  // standard deviations
+// Shares of a difference, in the order in which they are tried.
+constexpr double kTries[] = {1, -1, 0.1, -0.1};
 
-double weight(double squares, double scale) {
-  return (kTail + 3) / (kTail * scale * scale + squares);
+double weight(Loss loss, double squares, double scale) {
+  if (loss == Loss::kStudent) return (kTail + 3) / (kTail * scale * scale + squares);
+  const double far = std::min(1.0, kFar * kFar * scale * scale / squares);
+  return (loss == Loss::kHuber ? std::sqrt(far) : far) / (scale * scale);
 }
 
-double score_of(double squares, double scale) {
-  return -3 * std::log(scale) - (kTail + 3) / 2 * std::log1p(squares / (kTail * scale * scale));
+double score_of(Loss loss, double squares, double scale) {
+  const double relative = squares / (scale * scale), far = kFar * kFar;
+  const double constant = -3 * std::log(scale);
+  if (loss == Loss::kStudent) return constant - (kTail + 3) / 2 * std::log1p(relative / kTail);
+  const double beyond = std::max(1.0, relative / far);
+  const double grown = loss == Loss::kHuber ? 2 * (std::sqrt(beyond) - 1) : std::log(beyond);
+  return constant - 0.5 * (std::min(relative, far) + far * grown);
 }
 
 double squares_of(const Eigen::VectorXd& z, Eigen::Index i) {
   return z.segment<3>(3 * i).squaredNorm();
 }
 
+// An observation that jumps, across the rim of a patch, say, moves no farther than one that is far
+// beyond the others.
+void bound_jumps(double far, Eigen::VectorXd* change) {
+  for (Eigen::Index i = 0; i < change->size(); i += 3) {
+    const double moved = change->segment<3>(i).norm();
+    if (moved > far) change->segment<3>(i) *= far / moved;
+  }
+}
+
 }  // namespace
 
-double robust_score(const Eigen::VectorXd& z, double scale) {
+double Fitter::robust_score(const Eigen::VectorXd& z, double scale) const {
   double sum = 0;
-  for (Eigen::Index i = 0; i < z.size() / 3; ++i) sum += score_of(squares_of(z, i), scale);
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    if (!learns_from(i, std::nullopt)) continue;
+    sum += score_of(observations_.loss, squares_of(z, static_cast<Eigen::Index>(i)), scale);
+  }
   return sum;
 }
 
-double best_scale(const Eigen::VectorXd& z, double least, double most) {
-  if (z.size() == 0) return 1;
+double Fitter::best_scale(const Eigen::VectorXd& z, std::optional<std::size_t> without_fold) const {
+  const double least = observations_.least_scale, most = observations_.most_scale;
+  std::vector<double> squares;
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    if (learns_from(i, without_fold)) {
+      squares.push_back(squares_of(z, static_cast<Eigen::Index>(i)));
+    }
+  }
+  if (squares.empty() || least == most) return std::clamp(1.0, least, most);
+  const auto numbers = static_cast<double>(3 * squares.size());
   // The likelihood's own fixed point, which rises with every round (expectation, maximisation).
-  double scale =
-      std::clamp(std::sqrt(z.squaredNorm() / static_cast<double>(z.size())), least, most);
+  double scale = std::clamp(std::sqrt(mean(squares) / 3), least, most);
   for (int round = 0; round < 60; ++round) {
     double sum = 0;
-    for (Eigen::Index i = 0; i < z.size() / 3; ++i) {
-      const double squares = squares_of(z, i);
-      sum += weight(squares, scale) * squares * scale * scale;
+    for (const double s : squares) {
+      sum += weight(observations_.loss, s, scale) * s * scale * scale;
     }
-    const double next = std::clamp(std::sqrt(sum / static_cast<double>(z.size())), least, most);
+    const double next = std::clamp(std::sqrt(sum / numbers), least, most);
     const bool same = std::abs(next - scale) < 1e-4 * scale;
     scale = next;
     if (same) break;
@@ -54,8 +84,9 @@ double best_scale(const Eigen::VectorXd& z, double least, double most) {
   return scale;
 }
 
-Fitter::Fitter(const Forward& forward, const Observations& observations, Space space)
-    : forward_(forward), observations_(observations), space_(std::move(space)) {}
+Fitter::Fitter(const Forward& forward, const Observations& observations, Space space,
+               const Forward* coarse)
+    : forward_(forward), observations_(observations), space_(std::move(space)), coarse_(coarse) {}
 
 Eigen::Vector3d Fitter::residual(std::size_t i, const Pose& end) const {
   return observations_.whitener[i] * local_difference(end, observations_.measured[i]);
@@ -81,10 +112,17 @@ Eigen::VectorXd Fitter::beside(const Eigen::VectorXd& u) const {
   return sum;
 }
 
-void Fitter::judge(Eigen::VectorXd z, Fit* fit) const {
+void Fitter::judge(Eigen::VectorXd z, Fit* fit, std::optional<std::size_t> without_fold) const {
   fit->z = std::move(z);
-  fit->scale = best_scale(fit->z, observations_.least_scale, observations_.most_scale);
-  fit->score = robust_score(fit->z, fit->scale) - 0.5 * fit->u.cwiseAbs2().dot(space_.prior());
+  fit->scale = best_scale(fit->z, without_fold);
+  fit->score = robust_score(fit->z, fit->scale) - space_.price(fit->u, fit->u.size());
+}
+
+Fit Fitter::known(Eigen::VectorXd u, Eigen::VectorXd z) const {
+  Fit fit;
+  fit.u = std::move(u);
+  judge(std::move(z), &fit);
+  return fit;
 }
 
 Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& points,
@@ -133,6 +171,36 @@ std::vector<Eigen::Index> Fitter::columns_of_dimensions() const {
   return columns;
 }
 
+// Slopes of the `open` dimensions that can be moved by that share of their differences.
+Status Fitter::move_each(const Forward& forward, const Eigen::VectorXd& from, double share,
+                         std::vector<Eigen::Index>* open, Fit* fit) const {
+  std::vector<PredictionRequest> requests;
+  std::vector<Eigen::Index> dimension, closed;
+  for (const Eigen::Index k : *open) {
+    Eigen::VectorXd u = fit->u;
+    u[k] += share * fit->differences[k];
+    if (u[k] < space_.lower()[k] || u[k] > space_.upper()[k]) continue;
+    requests.push_back({space_.values(u), {}});
+    dimension.push_back(k);
+  }
+  if (requests.empty()) return {};
+  ASSIGN_OR_RETURN(const auto ends, forward(requests));
+  for (std::size_t j = 0; j < requests.size(); ++j) {
+    if (!ends[j]) continue;
+    const Eigen::Index k = dimension[j];
+    const double step = share * fit->differences[k];
+    Eigen::VectorXd change = whitened(*ends[j]) - from;
+    const double moved = std::sqrt(change.squaredNorm() / static_cast<double>(change.size()));
+    bound_jumps(kFar * std::max(moved, fit->scale), &change);
+    fit->slopes.col(k) = change / step;
+    const double good = kGoodMove * fit->scale / std::max(moved / std::abs(step), 1e-9);
+    fit->differences[k] = std::clamp(good, kLeastDifference, kMostDifference);
+    closed.push_back(k);
+  }
+  std::erase_if(*open, [&](Eigen::Index k) { return contains(closed, k); });
+  return {};
+}
+
 Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
   const Eigen::Index dimensions = space_.dimensions();
   if (fit->differences.size() != dimensions) {
@@ -140,58 +208,45 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
     fit->differences.conservativeResize(dimensions);
     fit->differences.tail(dimensions - had).setConstant(kFirstDifference);
   }
-  std::vector<PredictionRequest> requests;
-  std::vector<double> moved;
-  std::vector<Eigen::Index> dimension;  // of each request
-  const std::vector<Eigen::Index> column = columns_of_dimensions();
-  for (Eigen::Index k = known; k < dimensions; ++k) {
-    if (column[static_cast<std::size_t>(k)] >= 0) continue;
-    dimension.push_back(k);
-    Eigen::VectorXd u = fit->u;
-    double step = fit->differences[k];
-    if (u[k] + step > space_.upper()[k]) step = -step;
-    u[k] += step;
-    requests.push_back({space_.values(u), {}});
-    moved.push_back(step);
-  }
-  ASSIGN_OR_RETURN(const auto ends, forward_(requests));
   fit->slopes.conservativeResize(fit->z.size(), dimensions);
   fit->slopes.rightCols(dimensions - known).setZero();
+  const std::vector<Eigen::Index> column = columns_of_dimensions();
+  std::vector<Eigen::Index> open;
   for (Eigen::Index k = known; k < dimensions; ++k) {
     const Eigen::Index c = column[static_cast<std::size_t>(k)];
     if (c >= 0) fit->slopes.col(k) = -observations_.columns.col(c);
+    if (c < 0) open.push_back(k);
   }
-  const Eigen::VectorXd linear = beside(fit->u);
-  for (std::size_t j = 0; j < requests.size(); ++j) {
-    const Eigen::Index k = dimension[j];
-    if (!ends[j]) {
-      fit->differences[k] /= 4;
-      continue;
+  const Forward* forward = &forward_;
+  Eigen::VectorXd from = fit->z - beside(fit->u);
+  if (coarse_ != nullptr && !open.empty()) {
+    ASSIGN_OR_RETURN(const auto there, (*coarse_)({{space_.values(fit->u), {}}}));
+    if (there.front()) {
+      forward = coarse_;
+      from = whitened(*there.front());
     }
-    const Eigen::VectorXd change = whitened(*ends[j]) + linear - fit->z;
-    fit->slopes.col(k) = change / moved[j];
-    const double unit =
-        std::sqrt(change.squaredNorm() / static_cast<double>(change.size())) / std::abs(moved[j]);
-    const double good = kGoodMove * fit->scale / std::max(unit, 1e-9);
-    fit->differences[k] = std::clamp(good, kLeastDifference, kMostDifference);
   }
+  for (const double share : kTries) {
+    RETURN_IF_ERROR(move_each(*forward, from, share, &open, fit));
+  }
+  for (const Eigen::Index k : open) fit->differences[k] /= 4;
   fit->fresh = true;
   return {};
 }
 
-Fitter::Normal Fitter::normal(const Fit& fit, std::optional<std::size_t> without_fold) const {
+Normal Fitter::normal(const Fit& fit, std::optional<std::size_t> without_fold) const {
   const Eigen::Index dimensions = space_.dimensions();
   Normal normal{Eigen::MatrixXd::Zero(dimensions, dimensions), Eigen::VectorXd::Zero(dimensions)};
   for (std::size_t i = 0; i < observations_.size(); ++i) {
-    if (without_fold && observations_.fold[i] == *without_fold) continue;
+    if (!learns_from(i, without_fold)) continue;
     const auto at = static_cast<Eigen::Index>(i);
-    const double w = weight(squares_of(fit.z, at), fit.scale);
+    const double w = weight(observations_.loss, squares_of(fit.z, at), fit.scale);
     const auto rows = fit.slopes.middleRows<3>(3 * at);
     normal.matrix += w * rows.transpose() * rows;
     normal.right -= w * rows.transpose() * fit.z.segment<3>(3 * at);
   }
   normal.matrix.diagonal() += space_.prior();
-  normal.right -= space_.prior().cwiseProduct(fit.u);
+  normal.right += space_.pull(fit.u);
   // What the data do not see stays where it is.
   normal.matrix.diagonal().array() += 1e-9 * (1 + normal.matrix.diagonal().maxCoeff());
   return normal;
@@ -204,7 +259,7 @@ Eigen::VectorXd Fitter::bounded_step(const Eigen::VectorXd& u, const Normal& equ
 }
 
 double Fitter::promise(const Fit& fit) const {
-  const Normal equations = normal(fit, std::nullopt);
+  const Normal equations = normal(fit);
   return equations.gain(bounded_step(fit.u, equations));
 }
 
@@ -212,7 +267,7 @@ Status Fitter::step(Fit* fit) const {
   if (fit->slopes.size() == 0) {
     if (Status s = differentiate(fit); !s) return s;
   }
-  const Normal equations = normal(*fit, std::nullopt);
+  const Normal equations = normal(*fit);
   for (int half = 0; half <= kMostHalvings; ++half) {
     Normal damped = equations;
     damped.matrix.diagonal() *= 1 + fit->damping;
@@ -233,7 +288,7 @@ Status Fitter::step(Fit* fit) const {
                                       delta.squaredNorm();
       next.settled = gained < kSettledGain && fit->fresh;
       const bool lied = trust < kLeastTrust || trust > kMostTrust;
-      if (lied || gained < kSettledGain) next.slopes.resize(0, 0);
+      if (!next.settled && (lied || gained < kSettledGain)) next.slopes.resize(0, 0);
       *fit = std::move(next);
       return {};
     }
@@ -256,20 +311,23 @@ Status Fitter::improve(Fit* fit, int steps) const {
   return {};
 }
 
+Fit Fitter::linear_step(const Fit& fit, std::optional<std::size_t> without_fold) const {
+  Fit next = fit;
+  const Eigen::VectorXd delta = bounded_step(fit.u, normal(fit, without_fold));
+  next.u += delta;
+  judge(fit.z + fit.slopes * delta, &next, without_fold);
+  return next;
+}
+
 std::vector<double> Fitter::held_out(const Fit& fit) const {
   std::vector<double> scores(observations_.size(), 0.0);
   const std::size_t folds = 1 + *std::ranges::max_element(observations_.fold);
   for (std::size_t f = 0; f < folds; ++f) {
-    const Eigen::VectorXd z = fit.z + fit.slopes * bounded_step(fit.u, normal(fit, f));
-    std::vector<Eigen::Index> in_sample;
+    const Fit left = linear_step(fit, f);
     for (std::size_t i = 0; i < observations_.size(); ++i) {
-      if (observations_.fold[i] != f) in_sample.push_back(static_cast<Eigen::Index>(i));
-    }
-    const Eigen::VectorXd seen = z.reshaped(3, z.size() / 3)(Eigen::all, in_sample).reshaped();
-    const double scale = best_scale(seen, observations_.least_scale, observations_.most_scale);
-    for (std::size_t i = 0; i < observations_.size(); ++i) {
-      if (observations_.fold[i] != f) continue;
-      scores[i] = score_of(squares_of(z, static_cast<Eigen::Index>(i)), scale);
+      if (observations_.fold[i] != f || !learns_from(i, std::nullopt)) continue;
+      const double squares = squares_of(left.z, static_cast<Eigen::Index>(i));
+      scores[i] = score_of(observations_.loss, squares, left.scale);
     }
   }
   return scores;

@@ -15,6 +15,13 @@
 
 namespace gapfarm::infer {
 
+// How observations pull that are far out.  kStudent: the less the farther, by Student's t of kTail.
+// Where the noise is known, those within kFar of it pull in full, and others all alike, which leads
+// from afar (kHuber), or the less the farther, since near the end they are something else, which
+// must not lead away (kRedescending; MM-estimates begin with the one and end with the other, Yohai
+// 1987).
+enum class Loss { kStudent, kHuber, kRedescending };
+
 // What was measured: a pose an observation, what it varies by, and the part of the data that it is
 // held out with.
 struct Observations {
@@ -27,6 +34,8 @@ struct Observations {
   Eigen::MatrixXd columns = {};
   // Between which the scale of the noise lies, over what the whitener says.
   double least_scale = kLeastScale, most_scale = INFINITY;
+  Loss loss = Loss::kStudent;
+  std::vector<bool> ignored = {};  // of which nothing is learnt; empty: none
 
   std::size_t size() const { return measured.size(); }
 };
@@ -35,12 +44,6 @@ struct Observations {
 // simulated.  Errors: the simulation's own, never a point's.
 using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>>>>(
     const std::vector<PredictionRequest>& points)>;
-
-// Log density (nats, to a constant) of whitened residuals, three an observation, under Student's t
-// of that scale.
-double robust_score(const Eigen::VectorXd& z, double scale);
-// The scale between those that makes it greatest.
-double best_scale(const Eigen::VectorXd& z, double least = kLeastScale, double most = INFINITY);
 
 struct Fit {
   Eigen::VectorXd u;            // in the space's coordinates
@@ -54,10 +57,23 @@ struct Fit {
   bool settled = false;
 };
 
+// Of a step from a fit, to second order.
+struct Normal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+
+  // Nats that it gains.
+  double gain(const Eigen::VectorXd& delta) const {
+    return right.dot(delta) - 0.5 * delta.dot(matrix * delta);
+  }
+};
+
 class Fitter {
  public:
-  // REQUIRES: both outlive it.
-  Fitter(const Forward& forward, const Observations& observations, Space space);
+  // `coarse`: predictions for slopes alone, which are taken between two of them; null: `forward`.
+  // REQUIRES: all outlive it.
+  Fitter(const Forward& forward, const Observations& observations, Space space,
+         const Forward* coarse = nullptr);
 
   // The score at a point; -infinity where it cannot be simulated.
   Result<Fit> start(const Eigen::VectorXd& u) const;
@@ -68,26 +84,23 @@ class Fitter {
                                   const std::vector<Space>& spaces,
                                   const std::vector<std::vector<std::uint32_t>>& reach = {},
                                   const Eigen::VectorXd& elsewhere = {}) const;
+  // Where the whitened residuals are known to be these; without slopes.
+  Fit known(Eigen::VectorXd u, Eigen::VectorXd z) const;
   double promise(const Fit& fit) const;
   // Steps uphill, at most so many.
   Status improve(Fit* fit, int steps) const;
   // Slopes of this very point; the first `known` columns are there.
   Status differentiate(Fit* fit, Eigen::Index known = 0) const;
-  // Log score of every observation from fits to the other folds, linear steps from this one.
+  Normal normal(const Fit& fit, std::optional<std::size_t> without_fold = std::nullopt) const;
+  // After the best step, by the observations of other folds alone, were predictions linear.
+  // REQUIRES: slopes.
+  Fit linear_step(const Fit& fit, std::optional<std::size_t> without_fold = std::nullopt) const;
+  // Log score of every observation from fits to the other folds, linear steps from this one; 0 of
+  // ignored ones.
   // REQUIRES: slopes.
   std::vector<double> held_out(const Fit& fit) const;
 
  private:
-  struct Normal {
-    Eigen::MatrixXd matrix;
-    Eigen::VectorXd right;
-
-    // Nats that a step gains, to second order.
-    double gain(const Eigen::VectorXd& delta) const {
-      return right.dot(delta) - 0.5 * delta.dot(matrix * delta);
-    }
-  };
-  Normal normal(const Fit& fit, std::optional<std::size_t> without_fold) const;
   // The best step from `u` within the bounds, no coordinate farther than kLongestStep.
   Eigen::VectorXd bounded_step(const Eigen::VectorXd& u, const Normal& equations) const;
   Eigen::Vector3d residual(std::size_t observation, const Pose& end) const;
@@ -95,12 +108,24 @@ class Fitter {
   // What the coordinates without a parameter add there.
   Eigen::VectorXd beside(const Eigen::VectorXd& u) const;
   std::vector<Eigen::Index> columns_of_dimensions() const;
-  void judge(Eigen::VectorXd z, Fit* fit) const;
+  // Nats of residuals at that scale of the noise; the scale between those allowed that makes it
+  // greatest.
+  double robust_score(const Eigen::VectorXd& z, double scale) const;
+  double best_scale(const Eigen::VectorXd& z, std::optional<std::size_t> without_fold) const;
+  void judge(Eigen::VectorXd z, Fit* fit,
+             std::optional<std::size_t> without_fold = std::nullopt) const;
+  bool learns_from(std::size_t i, std::optional<std::size_t> without_fold) const {
+    if (!observations_.ignored.empty() && observations_.ignored[i]) return false;
+    return !without_fold || observations_.fold[i] != *without_fold;
+  }
+  Status move_each(const Forward& forward, const Eigen::VectorXd& from, double share,
+                   std::vector<Eigen::Index>* open, Fit* fit) const;
   Status step(Fit* fit) const;
 
   const Forward& forward_;
   const Observations& observations_;
   Space space_;
+  const Forward* coarse_;
 };
 
 }  // namespace gapfarm::infer

@@ -20,12 +20,14 @@ Scope scope_of(const Forward& forward, const Observations& whole,
                        {},
                        Eigen::MatrixXd(3 * some.index.size(), columns),
                        whole.least_scale,
-                       whole.most_scale};
+                       whole.most_scale,
+                       whole.loss};
   for (std::size_t k = 0; k < some.index.size(); ++k) {
     const std::uint32_t i = some.index[k];
     some.observations.measured.push_back(whole.measured[i]);
     some.observations.whitener.push_back(whole.whitener[i]);
     some.observations.fold.push_back(whole.fold[i]);
+    if (!whole.ignored.empty()) some.observations.ignored.push_back(whole.ignored[i]);
     if (columns == 0) continue;
     some.observations.columns.middleRows<3>(3 * k) = whole.columns.middleRows<3>(3 * i);
   }

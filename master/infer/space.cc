@@ -16,23 +16,32 @@ double least_positive(const Parameter& row) {
 
 }  // namespace
 
+std::vector<Coordinate> columns(Eigen::Index count) {
+  std::vector<Coordinate> all(static_cast<std::size_t>(count));
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    all[k].kind = Kind::kColumn;
+    all[k].row = k;
+    all[k].prior_sd = 1;
+  }
+  return all;
+}
+
 Space::Space(const ParameterTable& table, std::vector<Coordinate> coordinates, Overrides constants)
     : table_(&table), coordinates_(std::move(coordinates)), constants_(std::move(constants)) {
   for (const Coordinate& c : coordinates_) dimensions_ += c.dimensions();
   lower_ = Eigen::VectorXd::Constant(dimensions_, -INFINITY);
   upper_ = -lower_;
-  prior_ = Eigen::VectorXd::Zero(dimensions_);
+  prior_ = centre_ = Eigen::VectorXd::Zero(dimensions_);
   Eigen::Index k = 0;
   for (const Coordinate& c : coordinates_) {
-    if (c.kind == Kind::kColumn) {
-      prior_[k++] = 1;
+    prior_.segment(k, c.dimensions()).setConstant(1 / std::pow(c.prior_sd, 2));
+    centre_.segment(k, c.dimensions()).setConstant(c.centre);
+    if (c.kind == Kind::kAngle || c.kind == Kind::kColumn) {
+      k += c.dimensions();  // no bounds
       continue;
     }
     const Parameter& row = table[c.row];
-    if (c.has_prior) prior_.segment(k, c.dimensions()).setConstant(1 / std::pow(kPriorSizes, 2));
-    if (c.kind == Kind::kAngle) {
-      // no bounds
-    } else if (c.kind == Kind::kLinear) {
+    if (c.kind == Kind::kLinear) {
       lower_[k] = row.lower / c.size;
       upper_[k] = row.upper / c.size;
     } else if (c.kind == Kind::kLogarithm) {

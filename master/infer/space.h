@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -24,10 +25,14 @@ struct Coordinate {
   double symmetry = 1;            // kPolar: how often the effect looks the same in a full turn
   bool of_ratio = false;          // kPolar: the strength is the logarithm of a ratio
   double size = 1;                // of the value, or of its logarithm
-  bool has_prior = false;         // whether values of many sizes are implausible
+  double prior_sd = INFINITY;     // in sizes, of a prior about `centre`
+  double centre = 0;              // in sizes
 
   Eigen::Index dimensions() const { return kind == Kind::kPolar ? 2 : 1; }
 };
+
+// That many columns, from the first on.
+std::vector<Coordinate> columns(Eigen::Index count);
 
 class Space {
  public:
@@ -42,8 +47,14 @@ class Space {
   Overrides values(const Eigen::VectorXd& u) const;
   const Eigen::VectorXd& lower() const { return lower_; }
   const Eigen::VectorXd& upper() const { return upper_; }
-  // Precision of the prior about the neutral value, a dimension.
+  // Precision of the prior about its centre, a dimension.
   const Eigen::VectorXd& prior() const { return prior_; }
+  // What the prior of the first `count` dimensions costs there, nats.
+  double price(const Eigen::VectorXd& u, Eigen::Index count) const {
+    return 0.5 * prior_.head(count).dot((u - centre_).head(count).cwiseAbs2());
+  }
+  // Slope of that price, downhill.
+  Eigen::VectorXd pull(const Eigen::VectorXd& u) const { return prior_.cwiseProduct(centre_ - u); }
   // The same with more coordinates behind.
   Space with(const std::vector<Coordinate>& more) const;
   // The same without these of its coordinates; `u` loses their dimensions.
@@ -62,7 +73,7 @@ class Space {
   std::vector<Coordinate> coordinates_;
   Overrides constants_;
   Eigen::Index dimensions_ = 0;
-  Eigen::VectorXd lower_, upper_, prior_;
+  Eigen::VectorXd lower_, upper_, prior_, centre_;
 };
 
 }  // namespace gapfarm::infer

@@ -1,8 +1,9 @@
 #include "master/diagnose/fit/estimate.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "common/base/try.h"
 #include "common/math/algebra.h"
@@ -10,18 +11,15 @@
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/scope.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr int kMostHalvings = 4;
-// Of the objective (twice nats): less is no progress, where the noise is as large as it was taken
-// for.
-constexpr double kSettled = 1;
-constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
-// Of a finite difference, root mean square in standard deviations a row.
-constexpr double kLeastMove = 1e-4, kMostMove = 5, kGoodMove = 0.3;
-constexpr double kFarSquared = 16;  // squared distance beyond which a trial is far out
+// Of a parameter's range: one unit of its coordinate.
+constexpr double kUnitOfRange = 0.1;
+
+double unit_of(const Parameter& row) { return kUnitOfRange * (row.upper - row.lower); }
 
 // Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
 // catalogue's bounds make a small change.
@@ -50,199 +48,48 @@ std::vector<FittedParameter> parameters_of(const Study& study, const Overrides& 
   return parameters;
 }
 
-Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
-  ASSIGN_OR_RETURN(auto ends, predictor.ends({{fit->at, {}}}));
-  fit->ends = std::move(ends.front());
-  fit->residuals = study.residuals_about(fit->ends);
-  return {};
+infer::Forward coarse_forward(Predictor& predictor, const Study& study) {
+  return [&](std::vector<PredictionRequest> points) {
+    for (PredictionRequest& point : points) point = *coarser(predictor, study, point.at);
+    return predictor.attempt(points);
+  };
 }
 
-// Steps that moved the ends by many standard deviations, or by next to nothing, are taken again so
-// that they move them by a part of one: what a small change is, the motion says, not the bounds.
-Status rescale(Predictor& predictor, const Study& study, const SlopePoint& from,
-               std::vector<SlopeRequest>* requests, std::vector<std::optional<Slope>>* slopes) {
-  std::vector<SlopeRequest> again;
-  std::vector<std::size_t> of;
-  for (std::size_t k = 0; k < requests->size(); ++k) {
-    if (!(*slopes)[k]) continue;
-    const auto [parameter, step] = (*requests)[k];
-    const double rows = static_cast<double>(3 * study.size());
-    const double a_unit = std::sqrt(study.whiten(*(*slopes)[k]).squaredNorm() / rows);
-    const double moved = a_unit * step;
-    if (!(a_unit > 0) || (moved > kLeastMove && moved < kMostMove)) continue;
-    const Parameter& row = predictor.problem().table()[parameter];
-    again.push_back(
-        {parameter, std::min(kGoodMove / a_unit, kMostOfRange * (row.upper - row.lower))});
-    of.push_back(k);
-  }
-  if (again.empty()) return {};
-  ASSIGN_OR_RETURN(auto better, slopes_at(predictor, from, again));
-  for (std::size_t j = 0; j < of.size(); ++j) {
-    if (!better[j]) continue;
-    (*slopes)[of[j]] = std::move(better[j]);
-    (*requests)[of[j]] = again[j];
-  }
-  return {};
+infer::Fitter linear_fitter(const infer::Observations& observations, infer::Space space) {
+  static const infer::Forward nobody;  // is asked
+  return {nobody, observations, std::move(space)};
 }
 
-// A trial that jumps, across the rim of a patch, say, weighs no more than one that is far out.
-void bound_jumps(double step, Eigen::Ref<Eigen::VectorXd> slope) {
-  for (Eigen::Index i = 0; i < slope.size(); i += 3) {
-    const double moved2 = slope.segment<3>(i).squaredNorm() * step * step;
-    if (moved2 > kFarSquared) slope.segment<3>(i) *= std::sqrt(kFarSquared / moved2);
-  }
+// What the nuisances take of the fit's residuals.
+infer::Fit beside_nuisances(const Study& study, const JointFit& fit,
+                            const infer::Observations& observations) {
+  const infer::Space space(*study.table, infer::columns(observations.columns.cols()));
+  const infer::Fitter fitter = linear_fitter(observations, space);
+  infer::Fit none =
+      fitter.known(Eigen::VectorXd::Zero(space.dimensions()), study.whiten(fit.residuals));
+  if (space.dimensions() == 0) return none;
+  none.slopes = -observations.columns;
+  return fitter.linear_step(none);
 }
 
-// Derivatives of the predictions there.  What cannot be moved at all has none, and stays.
-Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
-  std::vector<SlopeRequest> requests;
-  for (const FittedParameter& p : fit->parameters) {
-    requests.push_back({p.row, step_of(predictor.problem().table()[p.row], p.value)});
+// Parameters, standard errors and derivatives of what was found.
+void take(const Study& study, const infer::Fitter& fitter, const infer::Fit& found, JointFit* fit) {
+  const Eigen::Index before = found.u.size() - static_cast<Eigen::Index>(fit->parameters.size());
+  const Eigen::MatrixXd inverse = inverse_of_symmetric(fitter.normal(found).matrix);
+  fit->jacobian.resize(found.z.size(), static_cast<Eigen::Index>(fit->parameters.size()));
+  for (std::size_t k = 0; k < fit->parameters.size(); ++k) {
+    FittedParameter& p = fit->parameters[k];
+    const Eigen::Index at = before + static_cast<Eigen::Index>(k);
+    const double unit = unit_of((*study.table)[p.row]);
+    p.value = fit->at.at(p.row);
+    p.standard_error = unit * std::sqrt(std::max(0.0, inverse(at, at)));
+    fit->jacobian.col(static_cast<Eigen::Index>(k)) = -found.slopes.col(at) / unit;
   }
-  fit->jacobian.setZero(3 * study.size(), fit->parameters.size());
-  if (requests.empty()) return {};
-  ASSIGN_OR_RETURN(const auto from, slope_point(predictor, study, fit->at, fit->ends));
-  ASSIGN_OR_RETURN(auto slopes, slopes_at(predictor, from, requests));
-  if (Status s = rescale(predictor, study, from, &requests, &slopes); !s) return s;
-  for (std::size_t k = 0; k < slopes.size(); ++k) {
-    if (!slopes[k]) continue;
-    fit->jacobian.col(k) = study.whiten(*slopes[k]);
-    bound_jumps(requests[k].step, fit->jacobian.col(k));
-  }
-  return {};
-}
-
-double within(const Parameter& row, double value) {
-  if (!goes_round(row)) return std::clamp(value, row.lower, row.upper);
-  const double turn = row.upper - row.lower;
-  return value - turn * std::floor((value - row.lower) / turn);
-}
-
-double scaled_step(const Parameter& row, double from, double to) {
-  if (!goes_round(row)) return to - from;
-  const double turn = row.upper - row.lower;
-  return to - from - turn * std::round((to - from) / turn);
-}
-
-// Prior of the base parameters about the tuned base, in their own units.
-void add_prior(const Study& study, const JointFit& fit, StepEquations* normal) {
-  add_base_prior(study, fit, &normal->matrix);
-  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const BaseParameter& p = study.base_parameters[k];
-    const double sd = prior_sd(study, p);
-    normal->right[k] += (study.base.at(p.row) - fit.parameters[k].value) / (sd * sd);
-  }
-  // Keeps a direction that the data do not see where it is.
-  const double scale = normal->matrix.diagonal().maxCoeff();
-  normal->matrix.diagonal().array() += 1e-12 * scale;
-}
-
-// Bounded for trials far out; 0 of what is ignored.
-Eigen::VectorXd weights_of(const Study& study, const JointFit& fit, const Eigen::VectorXd& z) {
-  Eigen::VectorXd weight(z.size());
-  for (Eigen::Index i = 0; i < z.size(); i += 3) {
-    const double d2 = z.segment<3>(i).squaredNorm();
-    const double own = d2 > kFarSquared ? kFarSquared / d2 : 1;
-    const double far = fit.loss == Loss::kHuber ? std::sqrt(own) : own;
-    weight.segment<3>(i).setConstant(study.ignores(i / 3) ? 0 : far);
-  }
-  return weight;
-}
-
-// The fit's parameters first, then what the nuisances take.
-StepEquations equations_of(const Study& study, const JointFit& fit,
-                           const Eigen::MatrixXd& nuisances, const Eigen::VectorXd& weight) {
-  Eigen::MatrixXd all(fit.jacobian.rows(), fit.jacobian.cols() + nuisances.cols());
-  all << fit.jacobian, nuisances;
-  const Eigen::MatrixXd weighted = weight.asDiagonal() * all;
-  StepEquations normal{all.transpose() * weighted,
-                       weighted.transpose() * study.whiten(fit.residuals)};
-  normal.matrix.diagonal().tail(nuisances.cols()).array() += 1;
-  add_prior(study, fit, &normal);
-  return normal;
-}
-
-// One step, with bounded weights for trials far out; fills in the standard errors.
-void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nuisances,
-          JointFit* fit) {
-  const Eigen::Index p = fit->jacobian.cols(), q = nuisances.cols();
-  const Eigen::VectorXd weight = weights_of(study, *fit, study.whiten(fit->residuals));
-  const StepEquations normal = equations_of(study, *fit, nuisances, weight);
-  const Eigen::MatrixXd inverse = inverse_of_symmetric(normal.matrix);
-  Eigen::VectorXd lower = Eigen::VectorXd::Constant(p + q, -INFINITY), upper = -lower;
-  for (Eigen::Index k = 0; k < p; ++k) {
-    const FittedParameter& parameter = fit->parameters[k];
-    const Parameter& row = problem.table()[parameter.row];
-    upper[k] = kMostOfRange * (row.upper - row.lower);
-    lower[k] = -upper[k];
-    if (goes_round(row)) continue;
-    upper[k] = std::min(upper[k], row.upper - parameter.value);
-    lower[k] = std::max(lower[k], row.lower - parameter.value);
-  }
-  const Eigen::VectorXd delta = bounded_minimum(normal.matrix, normal.right, lower, upper);
-  shift(problem.table(), delta, fit);
-  for (Eigen::Index k = 0; k < p; ++k) {
-    fit->parameters[k].standard_error = std::sqrt(std::max(0.0, inverse(k, k)));
-  }
-}
-
-// Residuals that are larger than their noise show as much less.
-double settled_within(const Study& study, double misfit) {
-  return kSettled * std::max(1.0, misfit / static_cast<double>(3 * study.size()));
-}
-
-struct Moved {
-  JointFit fit;
-  double misfit = 0;
-};
-
-// One step downhill, with the derivatives of before; where there is none, the fit with the standard
-// errors found here.  A step may lead past the optimum, or to where the robot nearly falls over:
-// half of it, then.
-Result<Moved> moved_on(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
-                       double best, const JointFit& fit) {
-  Moved next{fit, 0};
-  step(predictor.problem(), study, nuisances, &next.fit);
-  const std::vector<FittedParameter> whole = next.fit.parameters;
-  for (int half = 0;; ++half) {
-    const Status moved = predict(predictor, study, &next.fit);
-    if (moved) next.misfit = misfit_of(study, next.fit, nuisances);
-    if (moved && next.misfit <= best) return next;
-    if (!moved && moved.error().code != ErrorCode::kSimulation) return moved.error();
-    const bool level = moved && next.misfit < best + settled_within(study, best);
-    if (level || half == kMostHalvings) break;
-    for (std::size_t k = 0; k < whole.size(); ++k) {
-      FittedParameter& p = next.fit.parameters[k];
-      const double last = fit.parameters[k].value;
-      const Parameter& row = predictor.problem().table()[p.row];
-      next.fit.at[p.row] = p.value = within(row, last + scaled_step(row, last, p.value) / 2);
-    }
-  }
-  next = {fit, best};
-  for (std::size_t k = 0; k < whole.size(); ++k) {
-    next.fit.parameters[k].standard_error = whole[k].standard_error;
-  }
-  return next;
-}
-
-// To the parameters that fit without fold `f`, to first order.
-Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
-                             const std::vector<std::size_t>& fold_of, std::size_t f) {
-  const Eigen::VectorXd z = study.whiten(fit.residuals);
-  const bool only = *std::max_element(fold_of.begin(), fold_of.end()) == 0;
-  Eigen::VectorXd weight = weights_of(study, fit, z);
-  for (std::size_t i = 0; i < study.size() && !only; ++i) {
-    if (fold_of[i] == f) weight.segment<3>(static_cast<Eigen::Index>(3 * i)).setZero();
-  }
-  const StepEquations normal = equations_of(study, fit, no_nuisances(study), weight);
-  return solve_symmetric(normal.matrix, normal.right);
 }
 
 }  // namespace
 
 Eigen::MatrixXd no_nuisances(const Study& study) { return Eigen::MatrixXd(3 * study.size(), 0); }
-
-bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); }
 
 double prior_sd(const Study& study, const BaseParameter& p) {
   return p.prior_log_sd * study.base.at(p.row);
@@ -255,41 +102,47 @@ void add_base_prior(const Study& study, const JointFit& fit, Eigen::MatrixXd* in
   }
 }
 
-StepEquations step_equations(const Study& study, const JointFit& fit) {
-  return equations_of(study, fit, no_nuisances(study),
-                      weights_of(study, fit, study.whiten(fit.residuals)));
+infer::Observations observations_of(const Study& study, const Eigen::MatrixXd& nuisances,
+                                    Loss loss) {
+  infer::Observations all;
+  for (const ResidualTrial& t : study.trials) {
+    const Eigen::Vector3d r = residual_of(t, t.X_WP);  // late readings put right
+    all.measured.push_back(t.X_WP * Pose{r[0], r[1], r[2]});
+  }
+  all.whitener = study.whitener;
+  all.columns = nuisances;
+  all.least_scale = all.most_scale = 1;
+  all.loss = loss;
+  all.ignored = study.ignored;
+  return all;
 }
 
-void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* fit) {
-  for (std::size_t k = 0; k < fit->parameters.size(); ++k) {
-    FittedParameter& p = fit->parameters[k];
-    fit->at[p.row] = p.value = within(table[p.row], p.value + move[k]);
+infer::Space space_of(const Study& study, const JointFit& fit, Eigen::Index nuisances) {
+  std::vector<infer::Coordinate> all = infer::columns(nuisances);
+  for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
+    const std::size_t row = fit.parameters[k].row;
+    infer::Coordinate& c = all.emplace_back();
+    c.row = row;
+    c.size = unit_of((*study.table)[row]);
+    if ((*study.table)[row].key.ends_with(".direction")) c.kind = infer::Coordinate::Kind::kAngle;
+    if (k >= fit.base_parameters) continue;
+    c.prior_sd = prior_sd(study, study.base_parameters[k]) / c.size;
+    c.centre = study.base.at(row) / c.size;
   }
+  return {*study.table, std::move(all), fit.at};
+}
+
+infer::Fit as_searched(const Study& study, const JointFit& fit, const infer::Fitter& fitter,
+                       const infer::Space& space) {
+  infer::Fit searched = fitter.known(space.from(fit.at), study.whiten(fit.residuals));
+  const Eigen::VectorXd units = vector_of(
+      fit.parameters, [&](const FittedParameter& p) { return unit_of((*study.table)[p.row]); });
+  searched.slopes = -fit.jacobian * units.asDiagonal();
+  return searched;
 }
 
 double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
-  const Eigen::VectorXd z = study.whiten(fit.residuals);
-  const Eigen::VectorXd weight = weights_of(study, fit, z);
-  Eigen::MatrixXd normal = nuisances.transpose() * weight.asDiagonal() * nuisances;
-  normal.diagonal().array() += 1;
-  const Eigen::VectorXd taken =
-      solve_symmetric(normal, nuisances.transpose() * weight.asDiagonal() * z);
-  const Eigen::VectorXd left = z - nuisances * taken;
-  double sum = taken.squaredNorm();
-  for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
-    if (study.ignores(i)) continue;
-    const double d2 = left.segment<3>(3 * i).squaredNorm();
-    const double beyond = std::max(1.0, d2 / kFarSquared);
-    sum +=
-        std::min(d2, kFarSquared) +
-        kFarSquared * (fit.loss == Loss::kHuber ? 2 * (std::sqrt(beyond) - 1) : std::log(beyond));
-  }
-  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const BaseParameter& p = study.base_parameters[k];
-    const double away = (fit.parameters[k].value / study.base.at(p.row) - 1) / p.prior_log_sd;
-    sum += away * away;
-  }
-  return sum;
+  return -2 * beside_nuisances(study, fit, observations_of(study, nuisances, fit.loss)).score;
 }
 
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
@@ -335,19 +188,38 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   fit.at = start;
   fit.parameters = parameters_of(study, start, effects, base, &fit.base_parameters);
   fit.loss = loss;
-  if (Status s = predict(predictor, study, &fit); !s) return s.error();
-  if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
+  const infer::Forward forward = infer::remembering(
+      [&](const std::vector<PredictionRequest>& points) { return predictor.attempt(points); });
+  const auto predict = [&]() -> Status {
+    ASSIGN_OR_RETURN(auto ends, forward({{fit.at, {}}}));
+    if (!ends.front()) return predictor.failed("the model to begin at");
+    fit.ends = std::move(*ends.front());
+    fit.residuals = study.residuals_about(fit.ends);
+    return {};
+  };
+  RETURN_IF_ERROR(predict());
+  fit.jacobian.resize(3 * study.size(), 0);
   if (fit.parameters.empty()) return fit;
-  double best = misfit_of(study, fit, nuisances);
-  for (int round = 0; round < rounds; ++round) {
-    ASSIGN_OR_RETURN(auto moved, moved_on(predictor, study, nuisances, best, fit));
-    const bool settled = moved.misfit > best - settled_within(study, best);
-    best = moved.misfit;
-    fit = std::move(moved.fit);
-    // So near, the derivatives of before will do.
-    if (settled) break;
-    if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
+  const infer::Observations observations = observations_of(study, nuisances, loss);
+  const infer::Space space = space_of(study, fit, nuisances.cols());
+  const infer::Forward coarse = coarse_forward(predictor, study);
+  const bool is_coarser = coarser(predictor, study, start).has_value();
+  const infer::Fitter fitter(forward, observations, space, is_coarser ? &coarse : nullptr);
+  Eigen::VectorXd u = space.from(start);
+  u.head(nuisances.cols()) = beside_nuisances(study, fit, observations).u;
+  ASSIGN_OR_RETURN(auto found, fitter.start(u));
+  found.differences = Eigen::VectorXd::Ones(u.size());
+  for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
+    const FittedParameter& p = fit.parameters[k];
+    const Parameter& row = (*study.table)[p.row];
+    found.differences[nuisances.cols() + static_cast<Eigen::Index>(k)] =
+        step_of(row, p.value) / unit_of(row);
   }
+  RETURN_IF_ERROR(fitter.improve(&found, rounds));
+  if (found.slopes.size() == 0) RETURN_IF_ERROR(fitter.differentiate(&found));
+  fit.at = space.values(found.u);
+  RETURN_IF_ERROR(predict());
+  take(study, fitter, found, &fit);
   return fit;
 }
 
@@ -366,9 +238,14 @@ std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointF
 
 std::vector<Eigen::Vector3d> left_without(const Study& study, const JointFit& fit,
                                           const std::vector<std::size_t>& fold_of, std::size_t f) {
-  if (fit.jacobian.cols() == 0) return fit.residuals;
-  const Eigen::VectorXd step = fit.jacobian * step_without(study, fit, fold_of, f);
-  return study.unwhiten(study.whiten(fit.residuals) - step);
+  if (fit.parameters.empty()) return fit.residuals;
+  infer::Observations observations = observations_of(study, no_nuisances(study), fit.loss);
+  observations.fold = fold_of;
+  const infer::Space space = space_of(study, fit, 0);
+  const infer::Fitter fitter = linear_fitter(observations, space);
+  const infer::Fit all = as_searched(study, fit, fitter, space);
+  const bool only = *std::ranges::max_element(fold_of) == 0;
+  return study.unwhiten(fitter.linear_step(all, only ? std::nullopt : std::optional(f)).z);
 }
 
 std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,

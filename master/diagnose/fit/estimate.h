@@ -8,6 +8,7 @@
 #include "common/base/result.h"
 #include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/fit/regression.h"
+#include "master/infer/fit.h"
 
 namespace gapfarm {
 
@@ -18,10 +19,7 @@ struct FittedParameter {
   double bent = 1;  // by how much that is wider than slopes say (profile.h)
 };
 
-// How trials pull that are far out: all alike, which leads from afar; or the less the farther,
-// since near the end they are something else (a reading on a seam's other side), which must not
-// lead away (MM-estimates begin with the one and end with the other; Yohai 1987).
-enum class Loss { kHuber, kRedescending };
+using infer::Loss;
 
 struct JointFit {
   Overrides at;                             // base and effects
@@ -35,8 +33,9 @@ struct JointFit {
 
 enum class BaseParameters { kHeld, kFitted };
 
-// Gauss-Newton on the predictions, `rounds` re-linearisations; fitted base parameters have their
-// prior; `nuisances` (may have no columns) take part and are thrown away.
+// At most so many steps of infer::Fitter; fitted base parameters have their prior; `nuisances` (may
+// have no columns) take part and are thrown away.  Errors: the farm's, and a start that cannot be
+// simulated.
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<EffectCandidate>& effects, const Overrides& start,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds,
@@ -50,19 +49,16 @@ double prior_sd(const Study& study, const BaseParameter& p);
 // What that says of them, beside what the log does.
 void add_base_prior(const Study& study, const JointFit& fit, Eigen::MatrixXd* information);
 
-// Of a step that makes the misfit smaller, by a fit's derivatives, without nuisances.
-struct StepEquations {
-  Eigen::MatrixXd matrix;
-  Eigen::VectorXd right;
-};
-StepEquations step_equations(const Study& study, const JointFit& fit);
-// Directions go round: beyond the one bound they come in at the other.
-bool goes_round(const Parameter& row);
-// Moves the parameters by so much, within their bounds; predictions and derivatives stay.
-void shift(const ParameterTable& table, const Eigen::VectorXd& move, JointFit* fit);
+// The same as the competition sees it: `nuisances` are the first coordinates, the fit's parameters
+// the others.
+infer::Observations observations_of(const Study& study, const Eigen::MatrixXd& nuisances,
+                                    Loss loss);
+infer::Space space_of(const Study& study, const JointFit& fit, Eigen::Index nuisances);
+// With the fit's slopes, by the study's noise.
+infer::Fit as_searched(const Study& study, const JointFit& fit, const infer::Fitter& fitter,
+                       const infer::Space& space);
 
-// What a fit makes smaller: its loss of every trial's distance once the nuisances have taken their
-// part, and what that and the parameters cost under their priors.
+// Twice the nats that a fit's residuals cost once the nuisances have taken their part.
 double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances);
 
 // Where the seams of a fit run, searched with everything else held: the derivatives of a fit know

@@ -7,8 +7,7 @@
 #include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
-#include "master/diagnose/evidence/noise.h"
-#include "master/diagnose/subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -20,40 +19,42 @@ constexpr double kAside = 2, kLeastAside = 0.5;
 // rounds of the fit that goes on from there: chosen for the CPU seconds that they cost, on blind
 // checks of seeds 41, 43 and 47.
 constexpr int kFollowing = 2, kMostMoves = 4, kFitRounds = 2;
-// Of the misfit (twice nats): less is no progress, as in any fit (estimate.cc).
-constexpr double kLeastDrop = 1;
 // Times the standard error of the slopes; chosen, for a rise of nothing would make it infinite.
 constexpr double kWidest = 3;
 
 struct Aside {
-  std::size_t parameter = 0;
+  Eigen::Index parameter = 0;
   double by = 0;  // standard errors
-  JointFit there;
+  infer::Fit there;
   Eigen::VectorXd move;  // next
-  double misfit = INFINITY;
 };
 
+// About a fit whose slopes serve for all that is tried.
 class Profile {
  public:
-  Profile(Predictor& predictor, const Study& study, const JointFit& fit)
-      : predictor_(predictor),
-        study_(study),
-        fit_(fit),
-        none_(no_nuisances(study)),
-        inverse_(inverse_of_symmetric(step_equations(study, fit).matrix)),
-        misfit_(misfit_of(study, fit, none_)) {}
+  // `first`: those before are the base's.  REQUIRES: all outlive it.
+  Profile(const infer::Fitter& fitter, const infer::Space& space, const infer::Fit& middle,
+          Eigen::Index first)
+      : fitter_(fitter),
+        space_(space),
+        middle_(middle),
+        first_(first),
+        inverse_(inverse_of_symmetric(fitter.normal(middle).matrix)) {}
 
   Status look() {
-    std::vector<Aside*> moving;
-    for (std::size_t k = fit_.base_parameters; k < fit_.parameters.size(); ++k) {
+    for (Eigen::Index k = first_; k < middle_.u.size(); ++k) {
       if (!(inverse_(k, k) > 0)) continue;
+      const double error = std::sqrt(inverse_(k, k));
       for (const double side : {-1.0, 1.0}) {
-        const double error = std::sqrt(inverse_(k, k));
-        const double by = std::min(kAside, room(k, side) / error);
+        const double room =
+            side > 0 ? space_.upper()[k] - middle_.u[k] : middle_.u[k] - space_.lower()[k];
+        const double by = std::min(kAside, room / error);
         if (by < kLeastAside) continue;
-        asides_.push_back({k, by, fit_, inverse_.col(k) * (side * by / error)});
+        asides_.push_back({k, by, middle_, inverse_.col(k) * (side * by / error)});
+        asides_.back().there.score = -INFINITY;
       }
     }
+    std::vector<Aside*> moving;
     for (Aside& aside : asides_) moving.push_back(&aside);
     for (int step = 0; step <= kFollowing && !moving.empty(); ++step) {
       RETURN_IF_ERROR(move(moving));
@@ -63,54 +64,47 @@ class Profile {
   }
 
   // Where it is downhill, if it is anywhere.
-  const JointFit* lower() const {
-    const auto least = std::ranges::min_element(asides_, {}, &Aside::misfit);
-    const bool found = least != asides_.end() && least->misfit < misfit_ - kLeastDrop;
+  const infer::Fit* lower() const {
+    const Aside* least = nullptr;
+    for (const Aside& a : asides_) {
+      if (least == nullptr || a.there.score > least->there.score) least = &a;
+    }
+    const bool found = least != nullptr && least->there.score > middle_.score + infer::kSettledGain;
     return found ? &least->there : nullptr;
   }
 
   // By how much each effect's parameter is known less well than slopes say.
   std::vector<double> bent() const {
-    std::vector<double> all(fit_.parameters.size(), 1.0);
-    for (std::size_t k = fit_.base_parameters; k < all.size(); ++k) {
+    std::vector<double> all(static_cast<std::size_t>(middle_.u.size()), 1.0);
+    for (Eigen::Index k = first_; k < middle_.u.size(); ++k) {
       std::vector<double> risen;
       for (const Aside& aside : asides_) {
-        if (aside.parameter != k || !std::isfinite(aside.misfit)) continue;
-        risen.push_back((aside.misfit - misfit_) / (aside.by * aside.by));
+        if (aside.parameter != k || !std::isfinite(aside.there.score)) continue;
+        risen.push_back(2 * (middle_.score - aside.there.score) / (aside.by * aside.by));
       }
-      if (!risen.empty())
-        all[k] = std::clamp(1 / std::sqrt(std::max(mean(risen), 1e-9)), 1.0, kWidest);
+      if (risen.empty()) continue;
+      all[static_cast<std::size_t>(k)] =
+          std::clamp(1 / std::sqrt(std::max(mean(risen), 1e-9)), 1.0, kWidest);
     }
     return all;
   }
 
  private:
-  double room(std::size_t k, double side) const {
-    const FittedParameter& p = fit_.parameters[k];
-    const Parameter& row = (*study_.table)[p.row];
-    if (goes_round(row)) return INFINITY;
-    return side > 0 ? row.upper - p.value : p.value - row.lower;
-  }
-
   // Those that come no lower stay, and move no more.
   Status move(const std::vector<Aside*>& asides) {
-    std::vector<PredictionRequest> requests;
-    std::vector<JointFit> tried;
+    std::vector<Eigen::VectorXd> points;
     for (const Aside* aside : asides) {
-      shift(*study_.table, aside->move, &tried.emplace_back(aside->there));
-      requests.push_back({tried.back().at, {}});
+      points.emplace_back(
+          (aside->there.u + aside->move).cwiseMax(space_.lower()).cwiseMin(space_.upper()));
     }
-    ASSIGN_OR_RETURN(const auto ends, predictor_.attempt(requests));
+    ASSIGN_OR_RETURN(auto tried,
+                     fitter_.starts(points, std::vector<infer::Space>(points.size(), space_)));
     for (std::size_t j = 0; j < asides.size(); ++j) {
       Aside& aside = *asides[j];
       aside.move.resize(0);
-      if (!ends[j]) continue;
-      tried[j].ends = *ends[j];
-      tried[j].residuals = study_.residuals_about(*ends[j]);
-      const double misfit = misfit_of(study_, tried[j], none_);
-      if (misfit >= aside.misfit) continue;
-      aside.misfit = misfit;
+      if (!(tried[j].score > aside.there.score)) continue;
       aside.there = std::move(tried[j]);
+      aside.there.slopes = middle_.slopes;
       follow(&aside);
     }
     return {};
@@ -118,22 +112,21 @@ class Profile {
 
   // Where the others, by the slopes of the middle, have somewhere to go.
   void follow(Aside* aside) const {
-    StepEquations held = step_equations(study_, aside->there);
-    const auto k = static_cast<Eigen::Index>(aside->parameter);
+    infer::Normal held = fitter_.normal(aside->there);
+    const Eigen::Index k = aside->parameter;
     held.matrix.row(k).setZero();
     held.matrix.col(k).setZero();
     held.matrix(k, k) = 1;
     held.right[k] = 0;
     const Eigen::VectorXd move = solve_symmetric(held.matrix, held.right);
-    if (held.right.dot(move) > kLeastDrop) aside->move = move;
+    if (held.gain(move) > infer::kSettledGain) aside->move = move;
   }
 
-  Predictor& predictor_;
-  const Study& study_;
-  const JointFit& fit_;
-  const Eigen::MatrixXd none_;
+  const infer::Fitter& fitter_;
+  const infer::Space& space_;
+  const infer::Fit& middle_;
+  const Eigen::Index first_;
   const Eigen::MatrixXd inverse_;
-  const double misfit_;
   std::vector<Aside> asides_;
 };
 
@@ -142,17 +135,25 @@ class Profile {
 Result<JointFit> profiled(Predictor& predictor, const Study& study,
                           const std::vector<EffectCandidate>& effects, JointFit fit) {
   if (fit.parameters.size() == fit.base_parameters) return fit;
+  const infer::Forward forward = [&](const std::vector<PredictionRequest>& points) {
+    return predictor.attempt(points);
+  };
+  const infer::Observations observations = observations_of(study, no_nuisances(study), fit.loss);
+  const infer::Space space = space_of(study, fit, 0);
+  const infer::Fitter fitter(forward, observations, space);
+  infer::Fit middle = as_searched(study, fit, fitter, space);
   std::vector<double> bent;
   for (int moved = 0;; ++moved) {
-    Profile profile(predictor, study, fit);
+    Profile profile(fitter, space, middle, static_cast<Eigen::Index>(fit.base_parameters));
     RETURN_IF_ERROR(profile.look());
     bent = profile.bent();
-    const JointFit* lower = profile.lower();
+    const infer::Fit* lower = profile.lower();
     if (lower == nullptr || moved == kMostMoves) break;
-    fit = JointFit(*lower);
+    middle = infer::Fit(*lower);
   }
-  ASSIGN_OR_RETURN(fit, fit_jointly(predictor, study, effects, fit.at, BaseParameters::kFitted,
-                                    no_nuisances(study), kFitRounds, Loss::kRedescending));
+  ASSIGN_OR_RETURN(
+      fit, fit_jointly(predictor, study, effects, space.values(middle.u), BaseParameters::kFitted,
+                       no_nuisances(study), kFitRounds, Loss::kRedescending));
   for (std::size_t k = 0; k < bent.size(); ++k) {
     fit.parameters[k].bent = bent[k];
     fit.parameters[k].standard_error *= bent[k];

@@ -6,52 +6,24 @@
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {
-namespace {
 
-// In the order in which they are tried, in steps.
-constexpr double kTries[] = {1, -1, 0.1, -0.1};
-
-}  // namespace
-
-Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
-                               const std::vector<Pose>& ends) {
+std::optional<PredictionRequest> coarser(const Predictor& predictor, const Study& study,
+                                         const Overrides& at) {
   const double rate = study.subject->slope_rate_hz;
-  const std::uint32_t headings = study.subject->slope_headings;
-  if (rate == 0) return SlopePoint{at, ends};
-  const std::size_t row = study.table->row("step_rate");
-  if (value_at(predictor.problem(), at, row) <= rate) return SlopePoint{at, ends};
-  SlopePoint coarse{at, {}, headings};
-  coarse.at[row] = rate;
-  ASSIGN_OR_RETURN(auto there, predictor.attempt({{coarse.at, {}, headings}}));
-  if (!there.front()) return SlopePoint{at, ends};
-  coarse.ends = std::move(*there.front());
+  const auto row = rate == 0 ? std::nullopt : study.table->find("step_rate");
+  if (!row || value_at(predictor.problem(), at, *row) <= rate) return std::nullopt;
+  PredictionRequest coarse{at, {}, study.subject->slope_headings};
+  coarse.at[*row] = rate;
   return coarse;
 }
 
-Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const SlopePoint& from,
-                                                    const std::vector<SlopeRequest>& requests) {
-  const ParameterTable& table = predictor.problem().table();
-  std::vector<std::optional<Slope>> slopes(requests.size());
-  for (double share : kTries) {
-    std::vector<PredictionRequest> tries;
-    std::vector<std::size_t> of;
-    for (std::size_t k = 0; k < requests.size(); ++k) {
-      if (slopes[k]) continue;
-      const Parameter& row = table[requests[k].row];
-      const double moved = from.at.at(requests[k].row) + share * requests[k].step;
-      if (moved < row.lower || moved > row.upper) continue;
-      tries.push_back({from.at, {}, from.headings});
-      tries.back().at[requests[k].row] = moved;
-      of.push_back(k);
-    }
-    if (tries.empty()) continue;
-    ASSIGN_OR_RETURN(const auto moved, predictor.attempt(tries));
-    for (std::size_t j = 0; j < of.size(); ++j) {
-      if (!moved[j]) continue;
-      slopes[of[j]] = differences(from.ends, *moved[j], share * requests[of[j]].step);
-    }
-  }
-  return slopes;
+Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
+                               const std::vector<Pose>& ends) {
+  const auto coarse = coarser(predictor, study, at);
+  if (!coarse) return SlopePoint{at, ends};
+  ASSIGN_OR_RETURN(auto there, predictor.attempt({*coarse}));
+  if (!there.front()) return SlopePoint{at, ends};
+  return SlopePoint{coarse->at, std::move(*there.front()), coarse->headings};
 }
 
 Probe share_probe(const Study& study, std::size_t row, double share) {

@@ -1,4 +1,4 @@
-// Derivatives of predictions that stay where the robot can be simulated.
+// Small changes of predictions.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,11 +13,6 @@
 
 namespace gapfarm {
 
-struct SlopeRequest {
-  std::size_t row = 0;
-  double step = 0;  // > 0, as long as there is room for it
-};
-
 // Change of every trial's end a unit of the parameter.
 using Slope = std::vector<Eigen::Vector3d>;
 
@@ -27,17 +22,14 @@ struct SlopePoint {
   std::uint32_t headings = 0;  // as in v1::PredictTask
 };
 
-// `at`, whose ends are `ends`, with the subject's slope_rate_hz where that is coarser: steps of
-// twice the length move the robot a little differently, but alike from point to point.  Errors: the
-// farm's.
+// All trials at that point with the subject's slope_rate_hz, where that is coarser: steps of twice
+// the length move the robot a little differently, but alike from point to point.
+std::optional<PredictionRequest> coarser(const Predictor& predictor, const Study& study,
+                                         const Overrides& at);
+// There, or at `at` itself, whose ends are `ends`, where nothing is coarser or can be simulated.
+// Errors: the farm's.
 Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
                                const std::vector<Pose>& ends);
-
-// At `from`, in the axes of its ends.  One-sided: upward, or downward where the
-// bounds or the simulation end above, with a tenth of the step where neither can be simulated; none
-// where that cannot be either.  Errors: the farm's.
-Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const SlopePoint& from,
-                                                    const std::vector<SlopeRequest>& requests);
 
 // One finite difference: parameters at `plus`, less those at `minus` (empty: neutral).
 struct Probe {

@@ -17,12 +17,7 @@ using infer::Coordinate;
 constexpr double kAnySize = 100;
 
 infer::Space base_space(const Study& study, BaseParameters base, Eigen::Index columns) {
-  std::vector<Coordinate> coordinates;
-  for (Eigen::Index k = 0; k < columns; ++k) {
-    Coordinate& c = coordinates.emplace_back();
-    c.kind = Coordinate::Kind::kColumn;
-    c.row = static_cast<std::size_t>(k);
-  }
+  std::vector<Coordinate> coordinates = infer::columns(columns);
   if (base == BaseParameters::kHeld) {
     return infer::Space(*study.table, std::move(coordinates), study.base);
   }
@@ -63,22 +58,6 @@ std::vector<infer::Start> corners(const infer::Space& own) {
   return starts;
 }
 
-infer::Observations observations_of(const DiagnosisRequest& of, const Study& study) {
-  infer::Observations all;
-  all.measured = mapped(study.trials, &ResidualTrial::X_WE);
-  all.whitener = study.whitener;
-  all.fold = of.subject.folds(study);
-  return all;
-}
-
-std::vector<std::uint32_t> not_ignored(const Study& study) {
-  std::vector<std::uint32_t> index;
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    if (!study.ignores(i)) index.push_back(static_cast<std::uint32_t>(i));
-  }
-  return index;
-}
-
 Eigen::MatrixXd columns_of(const Evidence& evidence, const std::vector<Signature>& first) {
   std::vector<Eigen::VectorXd> columns;
   for (const Signature& s : first) {
@@ -102,20 +81,21 @@ Competition::Competition(const DiagnosisRequest& of, const Study& study, const E
                          const std::vector<Signature>& first, BaseParameters base)
     : of_(of),
       study_(study),
-      all_(infer::remembering([&of](const std::vector<PredictionRequest>& points) {
+      forward_(infer::remembering([&of](const std::vector<PredictionRequest>& points) {
         return of.predictor.attempt(points);
       })),
       base_(*study.table, {}) {
-  infer::Observations all = observations_of(of, study);
   // Where the base has to be searched anyway, nothing is known of it to first order; elsewhere the
   // noise is known from what no smooth function explains.
-  if (!of.subject.base_moves) {
-    all.columns = columns_of(evidence, first);
-    all.least_scale = infer::kBestScaleOfGaussian * std::sqrt(kLeastLeftoverScale);
-    all.most_scale = infer::kBestScaleOfGaussian * std::sqrt(kMostLeftoverScale);
-  }
-  base_ = base_space(study, base, all.columns.cols());
-  scope_ = infer::scope_of(all_, all, not_ignored(study));
+  const bool moves = of.subject.base_moves;
+  const Eigen::MatrixXd columns = moves ? no_nuisances(study) : columns_of(evidence, first);
+  observations_ = observations_of(study, columns, infer::Loss::kStudent);
+  observations_.fold = of.subject.folds(study);
+  observations_.least_scale =
+      moves ? infer::kLeastScale : infer::kBestScaleOfGaussian * std::sqrt(kLeastLeftoverScale);
+  observations_.most_scale =
+      moves ? INFINITY : infer::kBestScaleOfGaussian * std::sqrt(kMostLeftoverScale);
+  base_ = base_space(study, base, columns.cols());
 }
 
 std::vector<Coordinate> Competition::coordinates_of(const std::string& name) const {
@@ -127,10 +107,9 @@ std::vector<Coordinate> Competition::coordinates_of(const std::string& name) con
     c.row = searched_row(effect, size, table);
     const Parameter& p = table[c.row];
     c.size = size.size * (p.unit == "m" ? study_.scale : 1);
-    c.has_prior = !effect.searched.empty() &&
-                  std::none_of(effect.places.begin(), effect.places.end(), [&](const auto& place) {
-                    return std::string_view(place.key) == size.key;
-                  });
+    const bool is_place = std::ranges::any_of(
+        effect.places, [&](const auto& place) { return std::string_view(place.key) == size.key; });
+    if (!effect.searched.empty() && !is_place) c.prior_sd = infer::kPriorSizes;
     if (effect.polar) {
       c.kind = Coordinate::Kind::kPolar;
       c.direction_row = table.row(effect.polar->direction);
@@ -140,7 +119,7 @@ std::vector<Coordinate> Competition::coordinates_of(const std::string& name) con
       c.kind = Coordinate::Kind::kLogarithm;
     } else if (p.key.ends_with(".direction")) {
       c.kind = Coordinate::Kind::kAngle;
-      c.has_prior = false;
+      c.prior_sd = INFINITY;
     }
   }
   return coordinates;
@@ -166,7 +145,7 @@ std::vector<std::uint32_t> Competition::touched_by(const std::string& effect,
   Signature disc;
   disc.effect = effect;
   for (const auto& [row, value] : at) disc.fixed[of_.table()[row].key] = value;
-  return infer::within(scope_, study_.subject->touched_by(of_.problem, study_, patch_of(disc)));
+  return study_.subject->touched_by(of_.problem, study_, patch_of(disc));
 }
 
 infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
@@ -199,16 +178,10 @@ std::map<std::string, double> Competition::values_of(const std::string& effect,
 }
 
 Eigen::VectorXd Competition::unexplained(const infer::Model& model) const {
-  const Eigen::MatrixXd& columns = scope_.observations.columns;
-  return in_all_trials(model.fit.z + columns * model.fit.u.head(columns.cols()));
-}
-
-Eigen::MatrixXd Competition::in_all_trials(const Eigen::MatrixXd& rows) const {
-  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(3 * study_.size(), rows.cols());
-  for (std::size_t k = 0; k < scope_.index.size(); ++k) {
-    all.middleRows<3>(3 * scope_.index[k]) = rows.middleRows<3>(3 * k);
-  }
-  return all;
+  const Eigen::MatrixXd& columns = observations_.columns;
+  Eigen::VectorXd rows = model.fit.z + columns * model.fit.u.head(columns.cols());
+  study_.drop_ignored(rows);
+  return rows;
 }
 
 }  // namespace gapfarm::steps

@@ -11,7 +11,6 @@
 
 namespace gapfarm::steps {
 
-// Of all trials that are not ignored.
 class Competition {
  public:
   // `base`: held where it was tuned, beside the nuisances to first order, or searched with the
@@ -20,8 +19,8 @@ class Competition {
               const std::vector<Signature>& first, BaseParameters base);
   Competition& operator=(Competition&&) = delete;
 
-  const infer::Forward& forward() const { return scope_.forward; }
-  const infer::Observations& observations() const { return scope_.observations; }
+  const infer::Forward& forward() const { return forward_; }
+  const infer::Observations& observations() const { return observations_; }
   const infer::Space& base() const { return base_; }
   std::vector<infer::Coordinate> coordinates_of(const std::string& effect) const;
 
@@ -31,18 +30,16 @@ class Competition {
   infer::Hypothesis of_mark(const EffectCandidate& mark, const Regression& explained) const;
   std::map<std::string, double> values_of(const std::string& effect,
                                           const infer::Model& model) const;
-  // Whitened rows of all trials, as if nothing were explained but by the model's parameters.
+  // Whitened rows, as if nothing were explained but by the model's parameters; 0 of ignored trials.
   Eigen::VectorXd unexplained(const infer::Model& model) const;
-  // Rows of the observations as rows of all trials; zero in the others.
-  Eigen::MatrixXd in_all_trials(const Eigen::MatrixXd& rows) const;
 
  private:
   std::vector<std::uint32_t> touched_by(const std::string& effect, const Overrides& at) const;
 
   const DiagnosisRequest& of_;
   const Study& study_;
-  infer::Forward all_;
-  infer::Scope scope_;
+  infer::Forward forward_;
+  infer::Observations observations_;
   infer::Space base_;
 };
 

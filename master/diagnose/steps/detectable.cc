@@ -15,6 +15,13 @@ constexpr double kUnheld = 100;  // standard deviation of a coordinate without a
 // Standard deviation of what a model leaves, over what the whitener says.
 double noise_of(const infer::Model& model) { return model.fit.scale / infer::kBestScaleOfGaussian; }
 
+// Of what is learnt from, in standard deviations of the noise.
+Eigen::MatrixXd in_noise(const Study& study, const Eigen::MatrixXd& slopes, double noise) {
+  Eigen::MatrixXd own = slopes / noise;
+  study.drop_ignored(own);
+  return own;
+}
+
 // Columns in standard deviations of their coordinates' priors.
 Eigen::MatrixXd in_priors(Eigen::MatrixXd slopes, const Eigen::VectorXd& precision) {
   for (Eigen::Index k = 0; k < slopes.cols(); ++k) {
@@ -124,7 +131,7 @@ Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const S
     const infer::Fitter fitter(competition.forward(), competition.observations(),
                                model.space.with(h.coordinates));
     if (Status s = fitter.differentiate(&fit, before); !s) return s.error();
-    const Eigen::MatrixXd slopes = fit.slopes / noise;
+    const Eigen::MatrixXd slopes = in_noise(study, fit.slopes, noise);
     const Eigen::MatrixXd information = infer::information(
         slopes.rightCols(nothing.size()), in_priors(slopes.leftCols(before), model.space.prior()));
     const double squares = infer::detectable_squares(
@@ -144,8 +151,9 @@ void add_detectable_of_chosen(const DiagnosisRequest& of, const Study& study,
     const std::string& effect = c.effect();
     const std::vector<infer::Coordinate> coordinates = competition.coordinates_of(effect);
     const Eigen::Index own = competition.base().only(coordinates).dimensions();
-    const Eigen::MatrixXd slopes = model.fit.slopes.middleCols(at, own) / noise;
-    Eigen::MatrixXd others = in_priors(model.fit.slopes / noise, model.space.prior());
+    const Eigen::MatrixXd all_slopes = in_noise(study, model.fit.slopes, noise);
+    const Eigen::MatrixXd slopes = all_slopes.middleCols(at, own);
+    Eigen::MatrixXd others = in_priors(all_slopes, model.space.prior());
     others.middleCols(at, own).setZero();
     at += own;
     if (!of.subject.effects->row(effect).places.empty()) continue;

@@ -201,7 +201,8 @@ class Selection {
       Signature& mark = found_->chosen[k].signature;
       const Eigen::Index own =
           competition_.base().only(competition_.coordinates_of(mark.effect)).dimensions();
-      mark.columns = competition_.in_all_trials(found_->model.fit.slopes.middleCols(at, own));
+      mark.columns = found_->model.fit.slopes.middleCols(at, own);
+      study_.drop_ignored(mark.columns);
       if (of_.subject.effects->row(mark.effect).by_contact) {
         mark.columns = split_by_kind(study_, mark.columns);
       }

@@ -19,10 +19,6 @@
 namespace gapfarm::steps_test {
 namespace {
 
-Eigen::MatrixXd no_columns(const Study& study) {
-  return {static_cast<Eigen::Index>(3 * study.size()), 0};
-}
-
 // A log that a robot this much faster than the config's has driven, beside the config's.
 struct Driven {
   explicit Driven(double faster, KinematicFarm::Fails fails = {})
@@ -48,7 +44,7 @@ struct Driven {
 TEST(FitJointly, FindsTheSpeedThatDroveTheLog) {
   Driven d(1.08);
   const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
-                               no_columns(d.study), 6);
+                               no_nuisances(d.study), 6);
   ASSERT_TRUE(fit.ok()) << fit.error().message;
   EXPECT_NEAR(fit->at.at(row_of(Srv1::kFullSpeed)) / d.nominal_speed, 1.08, 2e-3);
   EXPECT_EQ(fit->base_parameters, d.study.base_parameters.size());
@@ -60,23 +56,23 @@ TEST(FitJointly, FindsTheSpeedThatDroveTheLog) {
 TEST(FitJointly, StaysWhereNothingIsToBeGained) {
   Driven d(1);
   const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
-                               no_columns(d.study), 6);
+                               no_nuisances(d.study), 6);
   ASSERT_TRUE(fit.ok()) << fit.error().message;
   for (const auto& [row, value] : fit->at) {
     EXPECT_NEAR(value, d.study.base.at(row), 1e-6) << d.problem.table()[row].key;
   }
-  EXPECT_LT(misfit_of(d.study, *fit, no_columns(d.study)), 1e-9);
+  EXPECT_LT(misfit_of(d.study, *fit, no_nuisances(d.study)), 1e-9);
 }
 
 TEST(FitJointly, NuisancesTakeWhatTheyMay) {
   Driven d(1.08);
   const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
-                               no_columns(d.study), 0);
+                               no_nuisances(d.study), 0);
   ASSERT_TRUE(fit.ok());
   const auto nuisances = nuisance_columns(d.predictor, d.study);
   ASSERT_TRUE(nuisances.ok()) << nuisances.error().message;
   EXPECT_LT(misfit_of(d.study, *fit, *nuisances),
-            0.1 * misfit_of(d.study, *fit, no_columns(d.study)));
+            0.1 * misfit_of(d.study, *fit, no_nuisances(d.study)));
 }
 
 // A fifth of the ends is read 3 cm too far ahead: they pull at the speed, until they fade.
@@ -86,7 +82,7 @@ TEST(FitJointly, WhatIsFarOutNoLongerLeadsAwayInTheEnd) {
     d.study.trials[i].X_WE = d.study.trials[i].X_WE * Pose{0.03, 0, 0};
   const auto fitted = [&](const Overrides& start, Loss loss) {
     const auto fit = fit_jointly(d.predictor, d.study, {}, start, BaseParameters::kFitted,
-                                 no_columns(d.study), 6, loss);
+                                 no_nuisances(d.study), 6, loss);
     EXPECT_TRUE(fit.ok());
     return fit->at;
   };
@@ -110,7 +106,7 @@ TEST(FitJointly, OnlyDerivativesAreOfCoarserSteps) {
     });
     EXPECT_THAT(rates, ::testing::ElementsAre(d.problem.values[rate]));
     const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
-                                 no_columns(d.study), 6);
+                                 no_nuisances(d.study), 6);
     ASSERT_TRUE(fit.ok()) << fit.error().message;
     EXPECT_NEAR(fit->at.at(row_of(Srv1::kFullSpeed)) / d.nominal_speed, 1.08, 2e-3);
     EXPECT_EQ(fit->at.count(rate), 0U);
@@ -135,16 +131,22 @@ Eigen::VectorXd column(std::size_t trials, const std::function<double(std::size_
   return c;
 }
 
+// To four trials, of what moves their ends by 10 m a unit.
+JointFit fit_of_one() {
+  JointFit fit;
+  fit.parameters = {{row_of(Srv1::kFullSpeed), 0.3}};
+  fit.at = {{fit.parameters[0].row, 0.3}};
+  fit.jacobian = column(4, [](std::size_t) { return 10; });
+  for (double x : {0.1, 0.2, 0.3, 0.4}) fit.residuals.emplace_back(x, 0, 0);
+  return fit;
+}
+
 TEST(HeldOut, ATrialIsPredictedByTheOtherFoldsAlone) {
   const Study study = plain_study(4);
-  JointFit fit;
-  fit.jacobian = column(4, [](std::size_t) { return 1; });
-  for (double x : {0.1, 0.2, 0.3, 0.4}) fit.residuals.emplace_back(x, 0, 0);
+  const JointFit fit = fit_of_one();
   const auto left = held_out_residuals(study, fit, {0, 0, 1, 1});
-  EXPECT_NEAR(left[0].x(), 0.1 - 0.35, 1e-9);
-  EXPECT_NEAR(left[1].x(), 0.2 - 0.35, 1e-9);
-  EXPECT_NEAR(left[2].x(), 0.3 - 0.15, 1e-9);
-  EXPECT_NEAR(left[3].x(), 0.4 - 0.15, 1e-9);
+  constexpr double kLeft[] = {0.1 - 0.35, 0.2 - 0.35, 0.3 - 0.15, 0.4 - 0.15};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(left[i].x(), kLeft[i], 1e-9);
   // In one fold there is nothing else to learn from.
   EXPECT_NEAR(held_out_residuals(study, fit, {0, 0, 0, 0})[0].x(), 0.1 - 0.25, 1e-9);
 }
@@ -152,9 +154,7 @@ TEST(HeldOut, ATrialIsPredictedByTheOtherFoldsAlone) {
 TEST(HeldOut, IgnoredTrialsTeachNothing) {
   Study study = plain_study(4);
   study.ignored = {false, false, false, true};
-  JointFit fit;
-  fit.jacobian = column(4, [](std::size_t) { return 1; });
-  for (double x : {0.1, 0.2, 0.3, 0.4}) fit.residuals.emplace_back(x, 0, 0);
+  const JointFit fit = fit_of_one();
   EXPECT_NEAR(held_out_residuals(study, fit, {0, 0, 1, 1})[0].x(), 0.1 - 0.3, 1e-9);
 }
 

@@ -1,6 +1,7 @@
 // A diagnosis that cannot go on as planned still ends with a report.
 #include <gtest/gtest.h>
 
+#include "common/base/ranges.h"
 #include "common/math/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/headline.h"
@@ -10,6 +11,7 @@
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/fit.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 
 namespace gapfarm::warning_test {
@@ -38,30 +40,42 @@ TEST(Predictor, LeavesOutWhatCannotBeSimulated) {
   EXPECT_EQ(ends.error().code, ErrorCode::kSimulation);
 }
 
-TEST(Slopes, StayWithinBoundsAndWhereTheRobotComesToRest) {
+TEST(InferSlopes, StayWithinBoundsAndWhereTheRobotComesToRest) {
   const std::size_t length = row_of(Srv1::kContactLength), gauge = row_of(Srv1::kTrackGauge);
   KinematicFarm farm([&](const ParameterValues& v) { return v[length] > 0.0701; });
   Problem problem = kinematic_log(12);
-  Predictor predictor(farm, problem);
-  const Overrides at = {{length, 0.07}, {gauge, problem.table()[gauge].upper}};
-  const auto ends = predictor.ends({{at, {}}});
-  ASSERT_TRUE(ends.ok());
+  infer::Observations observations;
+  observations.measured = mapped(problem.log.trials, &Trial::X_WE);
+  observations.whitener.assign(observations.measured.size(), Eigen::Matrix3d::Identity());
+  std::vector<infer::Coordinate> coordinates(2);
+  coordinates[0].row = length;
+  coordinates[1].row = gauge;
+  const infer::Space space(problem.table(), coordinates);
+  const Eigen::VectorXd at = space.from({{length, 0.07}, {gauge, problem.table()[gauge].upper}});
+  const auto differentiated = [&](Farm& by) {
+    Predictor predictor(by, problem);
+    const infer::Forward forward = [&](const auto& points) { return predictor.attempt(points); };
+    const infer::Fitter fitter(forward, observations, space);
+    infer::Fit fit = fitter.start(at).value();
+    fit.differences = Eigen::Vector2d(0.002, 0.004);
+    EXPECT_TRUE(fitter.differentiate(&fit));
+    return fit;
+  };
   // Steps up leave the bounds, or the robot never rests.
-  const auto slopes = slopes_at(predictor, {at, ends->front()}, {{length, 0.002}, {gauge, 0.004}});
-  ASSERT_TRUE(slopes.ok());
-  for (const auto& slope : *slopes) {
-    ASSERT_TRUE(slope);
+  const infer::Fit fit = differentiated(farm);
+  for (Eigen::Index k = 0; k < 2; ++k) {
     bool turns_less = false;
-    for (std::size_t i = 0; i < slope->size(); ++i) {
-      if (problem.log.trials[i].command == "turn_ccw") turns_less |= (*slope)[i][2] < -0.1;
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      if (problem.log.trials[i].command == "turn_ccw") {
+        turns_less |= fit.slopes(static_cast<Eigen::Index>(3 * i) + 2, k) > 0.1;
+      }
     }
     EXPECT_TRUE(turns_less);
   }
   KinematicFarm nowhere([&](const ParameterValues& v) { return v[length] != 0.07; });
-  Predictor stuck(nowhere, problem);
-  const auto none = slopes_at(stuck, {at, ends->front()}, {{length, 0.002}});
-  ASSERT_TRUE(none.ok());
-  EXPECT_FALSE((*none)[0]);
+  const infer::Fit stuck = differentiated(nowhere);
+  EXPECT_EQ(stuck.slopes.col(0).norm(), 0);
+  EXPECT_LT(stuck.differences[0], 0.002) << "a smaller step is tried next";
 }
 
 TEST(Slopes, OneSideAloneCountsTwice) {
@@ -193,14 +207,16 @@ TEST(HeldOutError, ATrialOnASeamStaysWhereItsFitHasIt) {
   nested.study.trials.resize(4);
   nested.study.whitener.assign(4, Eigen::Vector3d(100, 100, 50).asDiagonal());
   nested.fit.residuals.assign(4, {0.01, 0, 0});
+  nested.fit.parameters = {{row_of(Srv1::kFullSpeed), 0.3}};
+  nested.fit.at = {{nested.fit.parameters[0].row, 0.3}};
   nested.fit.jacobian = Eigen::MatrixXd::Zero(12, 1);
-  for (const Eigen::Index row : {3, 6, 9}) nested.fit.jacobian(row, 0) = 1;
-  nested.fit.jacobian(0, 0) = 200;
+  for (const Eigen::Index row : {3, 6, 9}) nested.fit.jacobian(row, 0) = 100;
+  nested.fit.jacobian(0, 0) = 2e4;
   const std::vector<std::size_t> each = {0, 1, 2, 3};
   const auto left = held_out_residuals(nested.study, nested.fit, each);
   EXPECT_LT(left[0].x(), -1.5);
   EXPECT_LT(steps::held_out_error(nested, each).position_mm, 10.01);
-  nested.fit.jacobian(0, 0) = 2;  // a slope like others: its miss counts
+  nested.fit.jacobian(0, 0) = 200;  // a slope like others: its miss counts
   EXPECT_NEAR(held_out_residuals(nested.study, nested.fit, each)[0].x(), -0.01, 1e-6);
 }
 

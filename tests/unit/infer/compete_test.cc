@@ -81,7 +81,7 @@ Hypothesis tilt() {
   c.row = row("table_tilt.angle");
   c.direction_row = row("table_tilt.direction");
   c.size = 0.03;
-  c.has_prior = true;
+  c.prior_sd = kPriorSizes;
   return {"table_tilt", {c}, {}, true};
 }
 
@@ -89,7 +89,7 @@ Hypothesis offset() {
   Coordinate c;
   c.row = row("com_offset.x");
   c.size = 0.003;
-  c.has_prior = true;
+  c.prior_sd = kPriorSizes;
   return {"com_offset", {c}, {}, true};
 }
 
