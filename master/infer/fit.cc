@@ -140,12 +140,8 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
     fits[k].u = points[k];
     if (!ends[k]) continue;
     const std::vector<std::uint32_t>& some = requests[k].trials;
-    if (some.empty()) {
-      judge(whitened(*ends[k]) + beside(points[k]), &fits[k]);
-      continue;
-    }
-    Eigen::VectorXd z = elsewhere;
     const Eigen::VectorXd linear = beside(points[k]);
+    Eigen::VectorXd z = some.empty() ? whitened(*ends[k]) + linear : elsewhere;
     for (std::size_t j = 0; j < some.size(); ++j) {
       const auto at = static_cast<Eigen::Index>(3 * some[j]);
       z.segment<3>(at) = residual(some[j], (*ends[k])[j]) + linear.segment<3>(at);

@@ -39,11 +39,7 @@ struct Deviation {
 
 Deviation deviation_of(const JointFit& fit, const Study& study, const Eigen::MatrixXd& nuisances,
                        std::size_t row) {
-  Eigen::MatrixXd slopes = fit.jacobian;
-  study.drop_ignored(slopes);
-  Eigen::MatrixXd information = infer::information(slopes, nuisances);
-  add_base_prior(study, fit, &information);
-  const Eigen::VectorXd least = infer::least_deviations(information);
+  const Eigen::VectorXd least = infer::least_deviations(information_of(study, fit, nuisances));
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
     const FittedParameter& p = fit.parameters[k];
     if (p.row == row) return {least[k] * p.bent, p.standard_error};

@@ -22,8 +22,7 @@ constexpr std::size_t kMostSamples = 40;  // of a path that is shown
 // Covariance of the fit's parameters, for noise of unit variance.
 Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
   if (fit.parameters.empty()) return {};
-  Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
-  add_base_prior(study, fit, &normal);
+  const Eigen::MatrixXd normal = information_of(study, fit, no_nuisances(study));
   const Eigen::VectorXd curvatures = axes_of_symmetric(normal).values;
   const double rounding = std::numeric_limits<double>::epsilon() *
                           static_cast<double>(normal.rows()) * curvatures.maxCoeff();

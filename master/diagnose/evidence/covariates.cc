@@ -127,6 +127,15 @@ std::vector<Feature> start_place(const Study& study) {
           [=](const ResidualTrial& t) { return y(t) * y(t); }};
 }
 
+std::vector<Feature> harmonics(const Feature& angle, int most) {
+  std::vector<Feature> features;
+  for (int h = 1; h <= most; ++h) {
+    features.push_back([=](const ResidualTrial& t) { return std::cos(h * angle(t)); });
+    features.push_back([=](const ResidualTrial& t) { return std::sin(h * angle(t)); });
+  }
+  return features;
+}
+
 std::vector<PoseFeature> powers_of_place(const Study& study) {
   const Eigen::Vector2d middle = middle_of(study);
   std::vector<PoseFeature> powers;
@@ -144,10 +153,8 @@ std::vector<PoseFeature> powers_of_place(const Study& study) {
 std::vector<CovariateBlock> covariate_blocks(const Study& study) {
   const BlockBuilder b(study);
   const auto scaled = [&](const Feature& f) { return b.by_path(f); };
-  const auto heading = [&](int h) {
-    return std::vector<Values>{
-        scaled([=](const ResidualTrial& t) { return std::cos(h * t.X_WS.theta); }),
-        scaled([=](const ResidualTrial& t) { return std::sin(h * t.X_WS.theta); })};
+  const auto turns = [&](Pose ResidualTrial::*X, int h) {
+    return mapped(harmonics([=](const ResidualTrial& t) { return h * (t.*X).theta; }, 1), scaled);
   };
   const std::vector<Values> commands = drive_classes(study);
   double longest_s = 1;
@@ -167,18 +174,16 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
 
   std::vector<CovariateBlock> blocks;
   blocks.push_back(study.free_commands ? free_command_block(study) : b.cells());
-  blocks.push_back(b.block("start heading", heading(1), commands));
-  blocks.push_back(b.block("start heading, twice a turn", heading(2), commands));
-  blocks.push_back(b.block("start heading, four times a turn", heading(4), commands));
+  blocks.push_back(b.block("start heading", turns(&ResidualTrial::X_WS, 1), commands));
+  blocks.push_back(
+      b.block("start heading, twice a turn", turns(&ResidualTrial::X_WS, 2), commands));
+  blocks.push_back(
+      b.block("start heading, four times a turn", turns(&ResidualTrial::X_WS, 4), commands));
   if (study.free_commands) {
     // Arcs end in headings that the commands' names do not show.
-    const auto end_heading = [&](int h) {
-      return std::vector<Values>{
-          scaled([=](const ResidualTrial& t) { return std::cos(h * t.X_WP.theta); }),
-          scaled([=](const ResidualTrial& t) { return std::sin(h * t.X_WP.theta); })};
-    };
-    blocks.push_back(b.block("end heading", end_heading(1), commands));
-    blocks.push_back(b.block("end heading, twice a turn", end_heading(2), commands));
+    blocks.push_back(b.block("end heading", turns(&ResidualTrial::X_WP, 1), commands));
+    blocks.push_back(
+        b.block("end heading, twice a turn", turns(&ResidualTrial::X_WP, 2), commands));
   }
   blocks.push_back(b.block("start place", mapped(start_place(study), scaled), commands));
   blocks.push_back(b.readings());

@@ -21,6 +21,8 @@ using Feature = std::function<double(const ResidualTrial&)>;
 using PoseFeature = std::function<double(const Pose&)>;
 // Where a trial starts, seen from the middle of all starts, and the products of that.
 std::vector<Feature> start_place(const Study& study);
+// Cosine and sine of an angle and its multiples.
+std::vector<Feature> harmonics(const Feature& angle, int most);
 // x^i y^j of a pose up to the third power, seen from there.
 std::vector<PoseFeature> powers_of_place(const Study& study);
 

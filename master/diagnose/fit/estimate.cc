@@ -11,6 +11,7 @@
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/certificate.h"
 #include "master/infer/scope.h"
 
 namespace gapfarm {
@@ -95,11 +96,16 @@ double prior_sd(const Study& study, const BaseParameter& p) {
   return p.prior_log_sd * study.base.at(p.row);
 }
 
-void add_base_prior(const Study& study, const JointFit& fit, Eigen::MatrixXd* information) {
+Eigen::MatrixXd information_of(const Study& study, const JointFit& fit,
+                               const Eigen::MatrixXd& nuisances) {
+  Eigen::MatrixXd slopes = fit.jacobian;
+  study.drop_ignored(slopes);
+  Eigen::MatrixXd information = infer::information(slopes, nuisances);
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const double sd = prior_sd(study, study.base_parameters[k]);
-    (*information)(k, k) += 1 / (sd * sd);
+    information(k, k) += 1 / (sd * sd);
   }
+  return information;
 }
 
 infer::Observations observations_of(const Study& study, const Eigen::MatrixXd& nuisances,

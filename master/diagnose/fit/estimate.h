@@ -46,8 +46,9 @@ Eigen::MatrixXd no_nuisances(const Study& study);
 
 // Standard deviation of a fitted base parameter's prior, in its own unit.
 double prior_sd(const Study& study, const BaseParameter& p);
-// What that says of them, beside what the log does.
-void add_base_prior(const Study& study, const JointFit& fit, Eigen::MatrixXd* information);
+// What trials that are learnt from, and that prior, say of the parameters beside the nuisances.
+Eigen::MatrixXd information_of(const Study& study, const JointFit& fit,
+                               const Eigen::MatrixXd& nuisances);
 
 // The same as the competition sees it: `nuisances` are the first coordinates, the fit's parameters
 // the others.

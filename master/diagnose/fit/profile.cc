@@ -65,12 +65,11 @@ class Profile {
 
   // Where it is downhill, if it is anywhere.
   const infer::Fit* lower() const {
-    const Aside* least = nullptr;
-    for (const Aside& a : asides_) {
-      if (least == nullptr || a.there.score > least->there.score) least = &a;
+    const infer::Fit* best = &middle_;
+    for (const Aside& aside : asides_) {
+      if (aside.there.score > best->score) best = &aside.there;
     }
-    const bool found = least != nullptr && least->there.score > middle_.score + infer::kSettledGain;
-    return found ? &least->there : nullptr;
+    return best->score > middle_.score + infer::kSettledGain ? best : nullptr;
   }
 
   // By how much each effect's parameter is known less well than slopes say.

@@ -166,16 +166,21 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
 
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
                                                 const std::vector<Patch>& places) {
-  ASSIGN_OR_RETURN(const auto without,
-                   slope_point(predictor, study, study.base, study.predicted_ends()));
+  PredictionRequest without = {study.base, {}};
+  std::vector<Pose> ends_without = study.predicted_ends();
+  if (const auto coarse = coarser(predictor, study, study.base)) {
+    ASSIGN_OR_RETURN(auto there, predictor.attempt({*coarse}));
+    if (there.front()) {
+      without = *coarse;
+      ends_without = std::move(*there.front());
+    }
+  }
   std::vector<PredictionRequest> requests;
   std::vector<std::map<std::string, double>> values;
   for (const Patch& place : places) {
-    PredictionRequest request;
+    PredictionRequest request = without;
     request.trials = study.subject->touched_by(predictor.problem(), study, place);
     values.push_back(patch_values(place));
-    request.at = without.at;
-    request.headings = without.headings;
     set_values(*study.table, values.back(), &request.at);
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));
@@ -190,7 +195,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
     std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
     for (std::size_t j = 0; ends[k] && j < requests[k].trials.size(); ++j) {
       const std::size_t i = requests[k].trials[j];
-      d[i] = local_difference(without.ends[i], (*ends[k])[j]);
+      d[i] = local_difference(ends_without[i], (*ends[k])[j]);
     }
     Signature s;
     s.effect = kPatchEffect;

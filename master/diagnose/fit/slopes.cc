@@ -17,15 +17,6 @@ std::optional<PredictionRequest> coarser(const Predictor& predictor, const Study
   return coarse;
 }
 
-Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
-                               const std::vector<Pose>& ends) {
-  const auto coarse = coarser(predictor, study, at);
-  if (!coarse) return SlopePoint{at, ends};
-  ASSIGN_OR_RETURN(auto there, predictor.attempt({*coarse}));
-  if (!there.front()) return SlopePoint{at, ends};
-  return SlopePoint{coarse->at, std::move(*there.front()), coarse->headings};
-}
-
 Probe share_probe(const Study& study, std::size_t row, double share) {
   const std::string& key = (*study.table)[row].key;
   const double value = study.base.at(row);

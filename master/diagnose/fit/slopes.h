@@ -16,20 +16,10 @@ namespace gapfarm {
 // Change of every trial's end a unit of the parameter.
 using Slope = std::vector<Eigen::Vector3d>;
 
-struct SlopePoint {
-  Overrides at;
-  std::vector<Pose> ends;
-  std::uint32_t headings = 0;  // as in v1::PredictTask
-};
-
 // All trials at that point with the subject's slope_rate_hz, where that is coarser: steps of twice
 // the length move the robot a little differently, but alike from point to point.
 std::optional<PredictionRequest> coarser(const Predictor& predictor, const Study& study,
                                          const Overrides& at);
-// There, or at `at` itself, whose ends are `ends`, where nothing is coarser or can be simulated.
-// Errors: the farm's.
-Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
-                               const std::vector<Pose>& ends);
 
 // One finite difference: parameters at `plus`, less those at `minus` (empty: neutral).
 struct Probe {

@@ -78,15 +78,6 @@ CovariateBlock readings(const Study& study) {
   return {"place of the readings", stack(columns)};
 }
 
-std::vector<Feature> harmonics(const Feature& angle, int most) {
-  std::vector<Feature> features;
-  for (int h = 1; h <= most; ++h) {
-    features.push_back([=](const ResidualTrial& t) { return std::cos(h * angle(t)); });
-    features.push_back([=](const ResidualTrial& t) { return std::sin(h * angle(t)); });
-  }
-  return features;
-}
-
 std::vector<Feature> powers(const Feature& value, int most) {
   std::vector<Feature> features;
   for (int p = 1; p <= most; ++p) {
