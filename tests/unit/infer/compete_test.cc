@@ -199,6 +199,45 @@ TEST(InferFit, FindsTheValueDespiteOutliers) {
   EXPECT_LT(base.fit.scale, 2);
 }
 
+// Wherever they lie, in the fit, its score and what is held out.
+TEST(InferFit, IgnoredObservationsTeachNothing) {
+  const Forward f = forward();
+  Observations o = observed({{row("finger_friction"), 0.6}});
+  o.ignored.assign(kObservations, false);
+  const auto fitted = [&](double away) {
+    for (std::size_t i = 0; i < kObservations; i += 3) {
+      o.ignored[i] = true;
+      o.measured[i].x += away;
+    }
+    return base_of(f, o);
+  };
+  const Model near = fitted(0.02), far = fitted(1);
+  EXPECT_NEAR(near.fit.u[0], far.fit.u[0], 1e-9);
+  EXPECT_NEAR(near.fit.score, far.fit.score, 1e-9);
+  EXPECT_EQ(far.held_out[3], 0);
+  EXPECT_NEAR(near.held_out[4], far.held_out[4], 1e-9);
+}
+
+// Of three logs alike the one without a prior is fitted at its own value, the others between that
+// and where the prior has it.
+TEST(InferFit, APriorPullsToItsCentre) {
+  const Forward f = forward();
+  const Observations o = observed({{row("finger_friction"), 0.6}});
+  const auto fitted = [&](double prior_sd) {
+    Coordinate c = friction();
+    c.centre = std::log(0.3) / c.size;
+    c.prior_sd = prior_sd;
+    const Space space(push_table(), {c});
+    const Fitter fitter(f, o, space);
+    Fit fit = fitter.start(space.from({{row("finger_friction"), 0.5}})).value();
+    EXPECT_TRUE(fitter.improve(&fit, 20));
+    return space.values(fit.u).at(row("finger_friction"));
+  };
+  EXPECT_NEAR(fitted(INFINITY), 0.6, 0.01);
+  EXPECT_LT(fitted(0.01), fitted(INFINITY) - 0.01);
+  EXPECT_NEAR(fitted(1e-5), 0.3, 0.01);
+}
+
 TEST(InferCompete, NamesWhatActsWithItsSize) {
   const Forward f = forward();
   const Observations o = observed({{row("finger_friction"), 0.6},
