@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -182,14 +183,14 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
   keep_levels_alive();
   ++generation_;
   const Standing& best = standings[order.front()];
-  if (best.outcome == v1::OK) bests_.push_back(best.cost);
+  const bool ranked = best.outcome == v1::OK || best.outcome == v1::INFEASIBLE;
+  bests_.push_back(ranked ? best.cost : std::numeric_limits<double>::infinity());
   const auto n = static_cast<double>(mean_.size());
   const auto span =
       static_cast<std::size_t>(10 + std::ceil(30 * n / static_cast<double>(population())));
   if (bests_.size() > span) bests_.erase(bests_.begin());
-  const bool flat =
-      bests_.size() == span &&
-      *std::ranges::max_element(bests_) - *std::ranges::min_element(bests_) <= kFlatCost;
+  const auto [least, most] = std::ranges::minmax(bests_);
+  const bool flat = bests_.size() == span && most <= least + kFlatCost;
   if (flat || converged()) begin_again();
 }
 

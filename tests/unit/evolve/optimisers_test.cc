@@ -131,6 +131,21 @@ TEST(CmaEs, RestartsLeaveLocalMinima) {
   EXPECT_LT(reached(rastrigin(4), settings, 20000), 0.9);
 }
 
+// Ranks among failures say nothing, so its distribution would neither move nor narrow.
+TEST(CmaEs, LeavesWhereEverythingFails) {
+  EvolutionSettings settings = settings_for(OptimiserKind::kCmaEs);
+  settings.optimiser.sigma = 1e-3;
+  ToyRun run(sphere(3), settings, 1);
+  run.scorer = [&](const Candidate& candidate) {
+    Score score;
+    score.outcome = candidate.genome[0] < 0.7 ? v1::DIVERGED : v1::OK;
+    score.cost = candidate.genome[1];
+    return score;
+  };
+  for (int i = 0; i < 300; ++i) run.generation();
+  EXPECT_EQ(run.optimiser().best().standing.outcome, v1::OK);
+}
+
 TEST(CmaEs, MinimaOnTheBoundsAreReached) {
   Toy toy;
   toy.rows.assign(4, toy_row(ParameterKind::kReal, 0, 2));
