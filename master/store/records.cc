@@ -83,9 +83,9 @@ void summarise_fitness(StoredGeneration& generation, bool higher_is_better) {
   }
   generation.best = generation.mean = generation.median = generation.worst = std::nullopt;
   if (fitness.empty()) return;
+  generation.best = generation.individuals.front().fitness;
   std::ranges::sort(fitness);
   const std::size_t n = fitness.size();
-  generation.best = higher_is_better ? fitness.back() : fitness.front();
   generation.worst = higher_is_better ? fitness.front() : fitness.back();
   generation.mean = std::accumulate(fitness.begin(), fitness.end(), 0.0) / static_cast<double>(n);
   generation.median = 0.5 * (fitness[(n - 1) / 2] + fitness[n / 2]);

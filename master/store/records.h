@@ -44,7 +44,8 @@ struct StoredIndividual {
   std::vector<NamedValue> objectives = {};
 };
 
-// One completed generation.  Fitness figures are over its OK individuals; none when it has none.
+// One completed generation.  Fitness figures are over its OK individuals, none when it has none;
+// `best` is the first one's, which of noisy scores need not be the least that anybody had once.
 struct StoredGeneration {
   std::uint64_t generation = 0;
   std::optional<double> best, mean, median, worst;

@@ -104,6 +104,22 @@ TEST_F(ObjectiveRuns, NumberOfWorkersAndKillsChangeNothing) {
   EXPECT_EQ(status("killed")["digest"], status("one")["digest"]);
 }
 
+// One lucky score of another one is lower.
+TEST_F(ObjectiveRuns, TheBestOfNoisyScoresIsTheSameOneEverywhere) {
+  const std::string noisy =
+      "    import random\n    answer['value'] += random.Random(task['seed']).gauss(0, 0.5)\n";
+  const std::string file = config(noisy, "noisy = true\n", "[optimiser]\nkind = \"cma_es\"\n");
+  const Finished run = evolve(file, "run", "16");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json found = status("run");
+  const Finished again = gapfarm_command({"replay", folder_ / "run", "--genome", "best"});
+  EXPECT_THAT(again.out,
+              AllOf(HasSubstr("genome " + found["best"]["birth_id"].dump() + " of generation 16"),
+                    HasSubstr(" from 8 scores")));
+  EXPECT_THAT(text_of(folder_.path() / "run" / "model.toml"),
+              HasSubstr("\nvalue = " + found["best_fitness"].dump()));
+}
+
 TEST_F(ObjectiveRuns, ResumeFromAnyFolder) {
   config("");
   const Finished resumed = shell(

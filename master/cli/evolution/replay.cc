@@ -50,26 +50,16 @@ Result<std::optional<Found>> latest(const RunReader& reader, std::optional<std::
   return std::optional<Found>();
 }
 
-// Of several objectives the first is the knee.  Null: nobody ended well.
-const StoredIndividual* best_of(const Individuals& individuals, bool higher_is_better) {
-  const StoredIndividual* best = nullptr;
-  if (!individuals.empty() && !individuals.front().objectives.empty()) return &individuals.front();
-  for (const StoredIndividual& other : individuals) {
-    if (!other.fitness) continue;
-    const bool better = best == nullptr || (higher_is_better ? *other.fitness > *best->fitness
-                                                             : *other.fitness < *best->fitness);
-    if (better) best = &other;
-  }
-  return best;
+// Null: nobody ended well.
+const StoredIndividual* first_that_ended_well(const Individuals& individuals) {
+  return !individuals.empty() && individuals.front().fitness ? &individuals.front() : nullptr;
 }
 
 Result<Found> find(const RunReader& reader, const ReplayOptions& options) {
   const auto& until = options.generation;
   const std::string run = reader.run().string();
   if (options.genome == "best") {
-    ASSIGN_OR_RETURN(auto best, latest(reader, until, [&](const Individuals& all) {
-                       return best_of(all, reader.info().higher_is_better);
-                     }));
+    ASSIGN_OR_RETURN(auto best, latest(reader, until, first_that_ended_well));
     if (best) return *std::move(best);
     return Error{run + ": no generation holds an individual that ended well; evolve it further"};
   }
