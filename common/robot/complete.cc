@@ -28,6 +28,7 @@ class Completion {
     if (Status s = wheels(); !s) return s;
     if (Status s = sizes(); !s) return s;
     if (Status s = full_speed(); !s) return s;
+    complete_controller(r_);
     return check_robot(r_);
   }
 
@@ -62,16 +63,16 @@ class Completion {
   }
 
   std::optional<double> separation() {
-    if (r_.controller.wheel_separation_m) return r_.controller.wheel_separation_m;
+    std::optional<double>& stated = r_.controller.wheel_separation_m;
+    if (stated) return stated;
     double left = 0, right = 0;
     for (const RobotWheel& w : r_.wheels) {
       if (!w.y_m || !w.driven) continue;
       left = std::max(left, *w.y_m);
       right = std::min(right, *w.y_m);
     }
-    if (left - right <= 0) return {};
-    r_.controller.wheel_separation_m = left - right;
-    return left - right;
+    if (left > right) stated = left - right;
+    return stated;
   }
 
   Status wheels() {
@@ -367,9 +368,8 @@ class Completion {
     if (m.full_speed_rad_s) {
       return Error{"full_speed (rad/s) and full_surface_speed (m/s) say the same; state one"};
     }
-    for (const RobotWheel& w : r_.wheels) {
-      if (!w.driven || m.full_speed_rad_s) continue;
-      m.full_speed_rad_s = *m.full_surface_speed_m_s / *w.radius_m;
+    if (const RobotWheel* any = driven_wheel(r_)) {
+      m.full_speed_rad_s = *m.full_surface_speed_m_s / *any->radius_m;
     }
     m.full_surface_speed_m_s.reset();
     return {};

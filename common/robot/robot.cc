@@ -107,6 +107,30 @@ const RobotWheel* driven_wheel(const GroundRobot& robot, std::optional<WheelSide
   return nullptr;
 }
 
+void complete_controller(GroundRobot& robot) {
+  ControllerKinematics& k = robot.controller;
+  const RobotWheel* any = driven_wheel(robot);
+  if (robot.command != CommandKind::kTwist || is_steered(robot) || any == nullptr) return;
+  if (!k.wheel_radius_m) {
+    const RobotWheel* left = driven_wheel(robot, WheelSide::kLeft);
+    const RobotWheel* right = driven_wheel(robot, WheelSide::kRight);
+    k.wheel_radius_m = any->radius_m;
+    if (left != nullptr) k.left_wheel_radius_multiplier *= *left->radius_m / *any->radius_m;
+    if (right != nullptr) k.right_wheel_radius_multiplier *= *right->radius_m / *any->radius_m;
+  }
+  const auto arm = [](const RobotWheel& w) {
+    return std::abs(*w.x_m * std::sin(w.heading_rad) - *w.y_m * std::cos(w.heading_rad));
+  };
+  const bool round = std::ranges::all_of(robot.wheels, [&](const RobotWheel& w) {
+    return !w.driven || std::abs(arm(w) - arm(*any)) < 1e-6;
+  });
+  if (robot.drive == DriveKind::kOmni && round && !k.robot_radius_m) k.robot_radius_m = arm(*any);
+  if (robot.drive != DriveKind::kMecanum || k.sum_of_robot_center_projection_m) return;
+  const double across = k.wheel_separation_m.value_or(2 * std::abs(*any->y_m));
+  k.sum_of_robot_center_projection_m =
+      std::abs(*any->x_m) + across * k.wheel_separation_multiplier / 2;
+}
+
 double side_radius_m(const GroundRobot& robot, std::string_view side) {
   if (side != "left" && side != "right") return 0;
   const RobotWheel* w = driven_wheel(robot, side == "left" ? WheelSide::kLeft : WheelSide::kRight);

@@ -166,6 +166,10 @@ double wheel_reach_m(const GroundRobot& robot);
 std::optional<std::size_t> channel_of(const RobotWheel& wheel,
                                       const std::vector<std::string>& channels);
 
+// What nobody states of a twist's controller becomes what the wheels, whose sizes are known, have
+// now: a fit may change these later, and the controller does not know.
+void complete_controller(GroundRobot& robot);
+
 // Of a box of even mass about the vertical, kg m^2.
 inline double box_yaw_inertia(double mass_kg, double length_m, double width_m) {
   return mass_kg * (length_m * length_m + width_m * width_m) / 12;

@@ -35,6 +35,32 @@ TEST(RobotDrive, TravelIsExactWhateverTheStep) {
   }
 }
 
+// Of which the file states no radius: it has those that the file gives the wheels.
+TEST(RobotDrive, ATwistsControllerDoesNotFollowAFittedRadius) {
+  for (const double right_m : {0.1, 0.08}) {
+    GroundRobot robot;
+    robot.command = CommandKind::kTwist;
+    robot.channels = {"v", "omega"};
+    robot.controller.wheel_separation_m = 0.4;
+    for (const char* side : {"left", "right"}) {
+      robot.wheels.push_back({});
+      robot.wheels.back().name = side;
+      robot.wheels.back().radius_m = side[0] == 'l' ? 0.1 : right_m;
+    }
+    ASSERT_TRUE(complete_robot(&robot).ok());
+    const std::vector<CommandRow> ahead = {{0, {0.5, 0}}};
+    const auto ratio = [&](std::size_t wheel) {
+      RobotDrive drive(robot, ahead);
+      return drive.advance(0, 0.01, 0)[wheel].speed_m_s / 0.5;
+    };
+    EXPECT_NEAR(ratio(0), 1, 1e-12);
+    EXPECT_NEAR(ratio(1), 1, 1e-12);
+    robot.wheels[0].radius_m = 0.097;
+    EXPECT_NEAR(ratio(0), 0.97, 1e-12);
+    EXPECT_NEAR(ratio(1), 1, 1e-12);
+  }
+}
+
 TEST(RobotDrive, LagGivesBackWhatItTakes) {
   GroundRobot slow = robot();
   slow.motors.lag_s = 0.2;
