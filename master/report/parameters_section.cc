@@ -53,10 +53,7 @@ HtmlColumn number_column(const TermColumn& column) {
 }
 
 std::string warnings(const std::vector<ParameterRow>& rows) {
-  std::vector<std::string> keys;
-  for (const ParameterRow& row : rows) {
-    if (bound_hit(row) != BoundHit::kNone) keys.push_back(row.key);
-  }
+  const std::vector<std::string> keys = keys_at_bounds(rows);
   if (keys.empty()) return "";
   return "<p class=\"caution-box\">▲ At a bound: " + html_names(keys) +
          ". The search wanted to go on: widen the range where it makes sense, and trust the rest "

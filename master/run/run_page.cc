@@ -102,9 +102,8 @@ void add_determined(const std::filesystem::path& file, std::vector<ParameterRow>
 }
 
 std::string action(const RunReport& report, const RunInfo& info) {
-  for (const ParameterRow& row : report.parameters) {
-    if (bound_hit(row) == BoundHit::kNone) continue;
-    return "Widen the range of " + row.key + " in [genes]: the best value lies at its end.";
+  if (const auto keys = keys_at_bounds(report.parameters); !keys.empty()) {
+    return "Widen the range of " + keys.front() + " in [genes]: the best value lies at its end.";
   }
   if (report.objective)
     return "gapfarm resume " + shell_quoted(report.name) + " --generations N searches on.";
@@ -225,8 +224,13 @@ Status replace_model(RunStore& store, const Model& model, RunWatcher& watcher) {
   return store.keep_document("model", quoted_hash(format_model(model)));
 }
 
-Status write_page(const RunStore& store) {
+Status write_page(const RunStore& store, RunWatcher& watcher) {
   ASSIGN_OR_RETURN(const auto report, read_run_report({store.run(), {}, {}}));
+  if (const auto keys = keys_at_bounds(report.parameters); !keys.empty()) {
+    watcher.note(
+        fmt::format("at the end of its range in [genes]: {}; a better value may lie beyond",
+                    fmt::join(keys, ", ")));
+  }
   return write_file_atomically((store.run() / "report.html").string(), run_html(report));
 }
 
@@ -345,7 +349,7 @@ Status write_outputs(RunStore& store, const Problem& problem, const Config& conf
     RETURN_IF_ERROR(write_poses(store, problem, summary, farm, validated));
   }
   RETURN_IF_ERROR(write_fitness(store));
-  return write_page(store);
+  return write_page(store, watcher);
 }
 
 }  // namespace gapfarm

@@ -50,7 +50,8 @@ class ObjectiveRuns : public ProgramRuns {
 TEST_F(ObjectiveRuns, FindTheLeastValueAndLeaveItsModel) {
   const Finished finished = evolve(config(""), "run", "40");
   ASSERT_EQ(finished.exit_code, 0) << finished.err;
-  EXPECT_THAT(finished.err, HasSubstr("evolving 4 parameters to the least value"));
+  EXPECT_THAT(finished.err, AllOf(HasSubstr("evolving 4 parameters to the least value"),
+                                  Not(HasSubstr("at the end of its range in [genes]: x"))));
   const json found = status("run");
   EXPECT_LT(found["best_fitness"], 1e-3);
   EXPECT_GE(found["best_fitness"], 0);
@@ -67,6 +68,14 @@ TEST_F(ObjectiveRuns, FindTheLeastValueAndLeaveItsModel) {
   const std::string birth = std::to_string(found["best"]["birth_id"].get<std::uint64_t>());
   const Finished again = gapfarm_command({"replay", folder_ / "run", "--genome", birth});
   EXPECT_THAT(again.out, HasSubstr("the same to the bit")) << again.err;
+}
+
+TEST_F(ObjectiveRuns, NameWhatEndedAtItsBound) {
+  const std::string file =
+      config("", "", "[genes]\nx = [0.5, 1]\nn = \"table\"\n[optimiser]\nkind = \"cma_es\"\n");
+  const Finished finished = evolve(file, "run", "60");
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  EXPECT_THAT(finished.err, HasSubstr("at the end of its range in [genes]: x;"));
 }
 
 TEST_F(ObjectiveRuns, MaximiseIsMinimiseWithTheOtherSign) {

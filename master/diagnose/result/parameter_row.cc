@@ -16,4 +16,12 @@ BoundHit bound_hit(const ParameterRow& row) {
   return BoundHit::kNone;
 }
 
+std::vector<std::string> keys_at_bounds(std::span<const ParameterRow> rows) {
+  std::vector<std::string> keys;
+  for (const ParameterRow& row : rows) {
+    if (bound_hit(row) != BoundHit::kNone) keys.push_back(row.key);
+  }
+  return keys;
+}
+
 }  // namespace gapfarm

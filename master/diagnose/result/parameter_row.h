@@ -2,7 +2,9 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace gapfarm {
 
@@ -33,5 +35,6 @@ inline constexpr double kStrongCorrelation = 0.8;
 // Whether `after` lies within a thousandth of the range from a bound.  A bound that is zero is no
 // hit: a size that ends there was not cut off by the search.  Nor are the ends of a circle.
 BoundHit bound_hit(const ParameterRow& row);
+std::vector<std::string> keys_at_bounds(std::span<const ParameterRow> rows);
 
 }  // namespace gapfarm
