@@ -1,6 +1,7 @@
 // [optimiser]: who searches.
 #include <algorithm>
 #include <array>
+#include <string_view>
 
 #include "common/config/sections.h"
 #include "common/config/stages.h"
@@ -28,6 +29,40 @@ DefaultOptimiser default_kind(const toml::table& config) {
   return {};
 }
 
+using Kind = OptimiserKind;
+
+// Of [optimiser], and who reads it beside `auto`, which may come to most of them.
+struct KeyOfKinds {
+  std::string_view key;
+  std::vector<OptimiserKind> kinds;
+  bool automatic = true;
+};
+const std::vector<KeyOfKinds> kKeysOfKinds = {
+    {"differential_weight", {Kind::kDifferentialEvolution, Kind::kDeSimplex}},
+    {"crossover_rate", {Kind::kDifferentialEvolution, Kind::kDeSimplex}},
+    {"sigma", {Kind::kCmaEs}},
+    {"restarts", {Kind::kCmaEs}},
+    {"iterations", {Kind::kDeSimplex}, false},
+    {"local", {Kind::kLocalSearch, Kind::kDeSimplex}, false},
+    {"step", {Kind::kLocalSearch, Kind::kDeSimplex}},
+    {"local_evaluations", {Kind::kLocalSearch, Kind::kDeSimplex}},
+};
+
+bool reads(OptimiserKind kind, const toml::table& evolution, std::string_view key) {
+  const bool for_all = std::ranges::find(kForAllKinds, key) != kForAllKinds.end();
+  if (for_all || kind == Kind::kGenetic || key == "asynchronous" || key == "islands") return true;
+  if (key != "population") return false;
+  return kind == Kind::kNsga2 || kind == Kind::kRandomSearch ||
+         evolution.contains("asynchronous") || evolution.contains("islands");
+}
+
+bool reads(OptimiserKind kind, std::string_view key) {
+  const auto row = std::ranges::find(kKeysOfKinds, key, &KeyOfKinds::key);
+  if (row == kKeysOfKinds.end()) return true;
+  if (kind == Kind::kAutoSearch) return row->automatic;
+  return std::ranges::find(row->kinds, kind) != row->kinds.end();
+}
+
 }  // namespace
 
 const std::vector<std::string>& optimiser_names() {
@@ -44,6 +79,28 @@ std::optional<DefaultOptimiser> default_optimiser(std::string_view config_text) 
   const auto config = parse_toml(config_text, "config");
   if (!config || config->at_path("optimiser.kind")) return std::nullopt;
   return default_kind(*config);
+}
+
+std::string unread_by_search(std::string_view config_text, OptimiserKind kind) {
+  const auto config = parse_toml(config_text, "config");
+  if (!config) return {};
+  std::string keys;
+  const auto add = [&](std::string_view section, std::string_view key) {
+    keys += (keys.empty() ? "" : ", ") + std::string(section) + "." + std::string(key);
+  };
+  if (const toml::table* evolution = (*config)["evolution"].as_table()) {
+    for (const auto& [key, value] : *evolution) {
+      if (!reads(kind, *evolution, key.str())) add("evolution", key.str());
+    }
+  }
+  if (const toml::table* optimiser = (*config)["optimiser"].as_table()) {
+    for (const auto& [key, value] : *optimiser) {
+      if (!reads(kind, key.str())) add("optimiser", key.str());
+    }
+  }
+  if (keys.empty()) return {};
+  return "kind = \"" + optimiser_names()[static_cast<std::size_t>(kind)] + "\" does not read " +
+         keys;
 }
 
 void read_optimiser(TomlSection& top, OptimiserSettings& to) {

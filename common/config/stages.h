@@ -45,4 +45,8 @@ struct DefaultOptimiser {
 // an [optimiser] kind, or is no config.
 std::optional<DefaultOptimiser> default_optimiser(std::string_view config_text);
 
+// Names keys of [evolution] and [optimiser] that are stated but that this kind of search does not
+// read, in a sentence; empty: there are none.
+std::string unread_by_search(std::string_view config_text, OptimiserKind kind);
+
 }  // namespace gapfarm

@@ -145,10 +145,13 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
     return stopped_by(store, optimiser.error(), last);
   }
   std::string reason = (*optimiser)->reason();
-  if (reason.empty() && request.config.evolution.optimiser.kind == OptimiserKind::kGenetic) {
+  const OptimiserKind kind = request.config.evolution.optimiser.kind;
+  if (reason.empty() && kind == OptimiserKind::kGenetic) {
     reason = default_optimiser(request.config.text).value_or(DefaultOptimiser{}).reason;
   }
-  if (!reason.empty()) watcher.note(reason);
+  for (const std::string& note : {reason, unread_by_search(request.config.text, kind)}) {
+    if (!note.empty()) watcher.note(note);
+  }
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,

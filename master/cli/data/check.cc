@@ -303,6 +303,8 @@ std::string search_text(const Config& config, const Summary& summary, unsigned w
                : "by " + std::string(optimisers()[static_cast<std::size_t>(kind)].name)) +
           ", at most " + std::to_string(config.evolution.generations) + " generations, seed " +
           std::to_string(config.seed) + "\n";
+  const std::string unread = unread_by_search(config.text, kind);
+  if (!unread.empty()) text += "             " + unread + "\n";
   const auto most = most_evaluations(config.evolution, config.problem.genes.size());
   const double all_s = summary.evaluation_s * static_cast<double>(most);
   const double one_s = summary.evaluation_s;

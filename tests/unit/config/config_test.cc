@@ -13,6 +13,7 @@ namespace gapfarm::config_test {
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 std::string error_of(const std::string& text) {
@@ -50,6 +51,20 @@ TEST(Config, WhoSearchesByDefaultFollowsFromWhatIsSet) {
   EXPECT_EQ(kind(operators), OptimiserKind::kGenetic);
   EXPECT_THAT(default_optimiser(operators)->reason, HasSubstr("sets its 'selection'"));
   EXPECT_FALSE(default_optimiser("[optimiser]\nkind = \"cma_es\"\n"));
+}
+
+TEST(Config, NamesWhatTheSearchDoesNotRead) {
+  const char* text =
+      "[evolution]\npopulation = 9\nselection = \"rank\"\nseed_nominal = true\n"
+      "[evolution.stop]\ngenerations = 9\n[optimiser]\nsigma = 0.2\nlocal = \"bobyqa\"\n"
+      "population = 30\n";
+  const auto unread = [&](OptimiserKind kind) { return unread_by_search(text, kind); };
+  EXPECT_EQ(unread(OptimiserKind::kCmaEs),
+            "kind = \"cma_es\" does not read evolution.population, evolution.selection, "
+            "optimiser.local");
+  EXPECT_THAT(unread(OptimiserKind::kRandomSearch), Not(HasSubstr("population")));
+  EXPECT_THAT(unread(OptimiserKind::kGenetic), Not(HasSubstr("evolution.")));
+  EXPECT_EQ(unread_by_search("", OptimiserKind::kAutoSearch), "");
 }
 
 TEST(Config, AFreePlanHasRangesAndAGridHasLevels) {
