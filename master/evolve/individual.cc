@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/base/hash.h"
+#include "common/base/try.h"
 
 namespace gapfarm {
 namespace {
@@ -180,6 +181,69 @@ void SeenGenomes::trim() {
   const auto end = order_.end() - static_cast<std::ptrdiff_t>(limit_);
   for (auto key = order_.begin(); key != end; ++key) standings_.erase(*key);
   order_.erase(order_.begin(), end);
+}
+
+CountingOptimiser::CountingOptimiser(const OptimiserSetup& setup)
+    : space_(*setup.table, setup.genes),
+      run_seed_(setup.run_seed),
+      noisy_(setup.noisy),
+      full_scores_(setup.noisy ? std::max(1U, setup.settings.elite_replicates) : 1),
+      births_apart_(setup.births_apart),
+      next_birth_id_(setup.first_birth),
+      seen_(setup.remembered) {}
+
+Stream CountingOptimiser::stream_of(std::uint64_t birth_id) const {
+  return Stream({.run_seed = run_seed_,
+                 .purpose = Purpose::kEvolution,
+                 .generation = generation_ + 1,
+                 .birth_id = birth_id});
+}
+
+bool CountingOptimiser::preferred(const Standing& a, const Standing& b) const {
+  if (a.outcome == v1::OK && b.outcome == v1::OK) {
+    const bool a_full = a.scores >= full_scores_, b_full = b.scores >= full_scores_;
+    if (a_full != b_full) return a_full;
+  }
+  return better(a, b);
+}
+
+void CountingOptimiser::update_best(std::uint64_t generation) {
+  const bool first = best_.genome.empty();
+  if (first) best_ = population_.front();
+  const Standing before = best_.standing;
+  for (const Individual& individual : population_) {
+    if (preferred(individual.standing, best_.standing)) best_ = individual;
+  }
+  if (first || better(best_.standing, before)) last_improvement_ = generation;
+}
+
+void CountingOptimiser::save_counts(bool with_best, v1::GeneticState& message) const {
+  message.set_generation(generation_);
+  message.set_next_birth_id(next_birth_id_);
+  message.set_evaluations(evaluations_);
+  message.set_last_improvement(last_improvement_);
+  for (const Individual& individual : population_) save(individual, *message.add_population());
+  if (with_best && generation_ > 0) save(best_, *message.add_hall());
+  save_seen(seen_, noisy_, message);
+}
+
+Status CountingOptimiser::restore_counts(bool with_best, const v1::GeneticState& message) {
+  RETURN_IF_ERROR(load_seen(message, seen_));
+  if (message.generation() > 0 &&
+      (message.population_size() == 0 || (with_best && message.hall_size() == 0))) {
+    return Error{"the saved optimiser state is damaged: it has no population or no best"};
+  }
+  for (const v1::Individual& saved : message.population()) {
+    ASSIGN_OR_RETURN(population_.emplace_back(), load(saved, space_));
+  }
+  if (with_best && message.generation() > 0) {
+    ASSIGN_OR_RETURN(best_, load(message.hall(0), space_));
+  }
+  generation_ = message.generation();
+  next_birth_id_ = message.next_birth_id();
+  evaluations_ = message.evaluations();
+  last_improvement_ = message.last_improvement();
+  return {};
 }
 
 }  // namespace gapfarm

@@ -1,4 +1,4 @@
-// Which of two individuals is the better, and how they are saved.
+// Which of two individuals is the better, how they are saved, and what optimisers of them share.
 #pragma once
 
 #include <cstdint>
@@ -90,5 +90,43 @@ Result<Individual> load(const v1::Individual& message, const GeneSpace& space);
 void save_seen(const SeenGenomes& seen, bool with_spread, v1::GeneticState& message);
 // Error: the lists of the message differ in length.
 Status load_seen(const v1::GeneticState& message, SeenGenomes& seen);
+
+// What optimisers of individuals count, keep and save alike.
+class CountingOptimiser : public Optimiser {
+ public:
+  std::uint64_t generation() const override { return generation_; }
+  std::uint64_t evaluations() const override { return evaluations_; }
+  std::uint64_t last_improvement() const override { return last_improvement_; }
+  const Individual& best() const override { return best_; }
+  double diversity() const override { return diversity_of(population_); }
+
+ protected:
+  explicit CountingOptimiser(const OptimiserSetup& setup);
+
+  // Of a child of the next generation.
+  Stream stream_of(std::uint64_t birth_id) const;
+  // Under noise a full set of scores outranks any lower cost.
+  bool preferred(const Standing& a, const Standing& b) const;
+  // Whom of the population the title goes to, in this generation.
+  void update_best(std::uint64_t generation);
+  // Everything below that changes; `with_best`: the best is no other than who is preferred.
+  void save_counts(bool with_best, v1::GeneticState& message) const;
+  // Error: the message is not one that save_counts() made for this setup.
+  Status restore_counts(bool with_best, const v1::GeneticState& message);
+
+  GeneSpace space_;
+  std::uint64_t run_seed_;
+  bool noisy_;
+  unsigned full_scores_;  // of an individual that may be the best
+  std::uint64_t births_apart_;
+
+  std::uint64_t generation_ = 0;
+  std::uint64_t next_birth_id_;
+  std::uint64_t evaluations_ = 0;
+  std::uint64_t last_improvement_ = 0;
+  std::vector<Individual> population_;  // best first
+  Individual best_;
+  SeenGenomes seen_;
+};
 
 }  // namespace gapfarm

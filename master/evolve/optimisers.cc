@@ -7,7 +7,6 @@
 #include "common/base/try.h"
 #include "gapfarm/v1/record.pb.h"
 #include "master/evolve/genetic/genetic.h"
-#include "master/evolve/genetic/nsga2.h"
 #include "master/evolve/individual.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/methods/cma_es.h"

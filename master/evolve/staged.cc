@@ -1,5 +1,3 @@
-#include "master/evolve/staged.h"
-
 #include <cassert>
 
 #include "common/base/try.h"

@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 
@@ -14,7 +13,6 @@
 #include "common/trials/read.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/optimisers.h"
-#include "master/evolve/staged.h"
 #include "master/ground/fit/simulated_start.h"
 #include "master/run/baseline_notes.h"
 #include "master/run/run_page.h"

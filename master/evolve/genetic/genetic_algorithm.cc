@@ -1,12 +1,12 @@
-#include "master/evolve/genetic/genetic_algorithm.h"
-
 #include <algorithm>
 #include <cassert>
+#include <optional>
 #include <unordered_set>
 #include <utility>
 
 #include "common/base/try.h"
-#include "master/evolve/individual.h"
+#include "master/evolve/genetic/breeder.h"
+#include "master/evolve/genetic/genetic.h"
 
 namespace gapfarm {
 namespace {
@@ -32,71 +32,89 @@ Status check(const OptimiserSetup& setup) {
   return {};
 }
 
-}  // namespace
+// A generation: elites carried over, children bred, all scored, ranked.
+class GeneticAlgorithm final : public CountingOptimiser {
+ public:
+  explicit GeneticAlgorithm(const OptimiserSetup& setup);
+
+  std::vector<Candidate> ask() override;
+  void tell(std::span<const Score> scores) override;
+  void meet(std::span<const std::vector<Individual>> others) override;
+
+  std::vector<Individual> members() const override;
+  std::vector<NamedNumber> operator_probabilities() const override {
+    return breeder_.probabilities();
+  }
+  std::string state() const override;
+  Status restore(std::string_view state) override;
+
+ private:
+  struct Newborn {
+    Individual individual;
+    std::optional<Standing> parent;  // of the better parent; none for random and nominal ones
+    std::vector<Child::Arm> arms;
+    bool asked = true;  // false: a genome that was scored before, or asked for a sibling
+  };
+  struct Plan {
+    std::vector<Individual> elites;
+    std::vector<Newborn> newborns;
+    std::vector<Candidate> candidates;
+  };
+
+  Plan plan_generation();
+  void add_first_generation(Plan& plan);
+  std::uint64_t next_birth();
+  void add_random(Plan& plan);
+  void add_children(Plan& plan);
+  void add_candidates(Plan& plan) const;
+  std::vector<Individual> choose_elites() const;
+  bool restart_due() const;
+
+  void take_scores(Plan& plan, std::span<const Score> scores);
+  void learn(const Plan& plan);
+
+  EvolutionSettings settings_;
+  Breeder breeder_;
+  Genome nominal_;
+  std::vector<Genome> given_;
+
+  std::uint64_t last_restart_ = 0;
+  std::uint64_t restarts_ = 0;
+  std::vector<Individual> others_;  // parents of the next generation, beside the population
+  std::optional<Plan> plan_;        // asked for, without scores yet
+};
 
 std::string GeneticAlgorithm::state() const {
   assert(!plan_ && "save between tell() and ask()");
   v1::GeneticState message;
-  message.set_generation(generation_);
-  message.set_next_birth_id(next_birth_id_);
-  message.set_evaluations(evaluations_);
-  message.set_last_improvement(last_improvement_);
+  save_counts(true, message);
   message.set_last_restart(last_restart_);
   message.set_restarts(restarts_);
-  for (const Individual& individual : population_) save(individual, *message.add_population());
-  if (generation_ > 0) {
-    message.set_best_fitness(best_.standing.cost);
-    save(best_, *message.add_hall());
-  }
+  if (generation_ > 0) message.set_best_fitness(best_.standing.cost);
   for (double quality : breeder_.qualities()) message.add_operator_weights(quality);
-  save_seen(seen_, noisy_, message);
   return message.SerializeAsString();
 }
 
 Status GeneticAlgorithm::restore(std::string_view state) {
   ASSIGN_OR_RETURN(const auto message, parse_state<v1::GeneticState>(state));
-  if (const Status status = load_seen(message, seen_); !status) return status.error();
-  if (message.generation() > 0 && (message.population_size() == 0 || message.hall_size() == 0)) {
-    return Error{"the saved optimiser state is damaged: it has no population"};
-  }
+  RETURN_IF_ERROR(restore_counts(true, message));
   const std::vector<double> qualities(message.operator_weights().begin(),
                                       message.operator_weights().end());
   if (!breeder_.restore(qualities)) {
     return Error{"the saved optimiser state has " + std::to_string(qualities.size()) +
                  " operators, but the config names others; resume with the config of the run"};
   }
-  for (const v1::Individual& saved : message.population()) {
-    ASSIGN_OR_RETURN(Individual individual, load(saved, breeder_.space()));
-    population_.push_back(std::move(individual));
-  }
-  if (message.generation() > 0) {
-    ASSIGN_OR_RETURN(Individual best, load(message.hall(0), breeder_.space()));
-    best_ = std::move(best);
-  }
-  generation_ = message.generation();
-  next_birth_id_ = message.next_birth_id();
-  evaluations_ = message.evaluations();
-  last_improvement_ = message.last_improvement();
   last_restart_ = message.last_restart();
   restarts_ = message.restarts();
   return {};
 }
 
-Result<std::unique_ptr<Optimiser>> make_genetic(const OptimiserSetup& setup) {
-  if (const Status status = check(setup); !status) return status.error();
-  return std::unique_ptr<Optimiser>(std::make_unique<GeneticAlgorithm>(setup));
-}
-
 GeneticAlgorithm::GeneticAlgorithm(const OptimiserSetup& setup)
-    : settings_(setup.settings),
-      breeder_(setup.settings, GeneSpace(*setup.table, setup.genes)),
+    : CountingOptimiser(setup),
+      settings_(setup.settings),
+      breeder_(setup.settings, space_),
       nominal_(setup.nominal),
-      given_(setup.given),
-      run_seed_(setup.run_seed),
-      noisy_(setup.noisy),
-      next_birth_id_(setup.first_birth),
-      births_apart_(setup.births_apart),
-      seen_(setup.remembered) {}
+      given_(setup.given) {}
 
 std::vector<Candidate> GeneticAlgorithm::ask() {
   if (!plan_) plan_ = plan_generation();
@@ -115,7 +133,11 @@ void GeneticAlgorithm::tell(std::span<const Score> scores) {
   for (Newborn& newborn : plan.newborns) population_.push_back(std::move(newborn.individual));
   sort_best_first(population_);
   seen_.trim();
-  update_best();
+  // The old best is judged by what its re-scoring has shown.
+  for (const Individual& individual : population_) {
+    if (individual.birth_id == best_.birth_id) best_.standing = individual.standing;
+  }
+  update_best(generation_);
 }
 
 GeneticAlgorithm::Plan GeneticAlgorithm::plan_generation() {
@@ -136,19 +158,12 @@ GeneticAlgorithm::Plan GeneticAlgorithm::plan_generation() {
   return plan;
 }
 
-Stream GeneticAlgorithm::stream_of(std::uint64_t birth_id) const {
-  return Stream({.run_seed = run_seed_,
-                 .purpose = Purpose::kEvolution,
-                 .generation = generation_ + 1,
-                 .birth_id = birth_id});
-}
-
 void GeneticAlgorithm::add_first_generation(Plan& plan) {
   const auto add = [&](const Genome& genome, unsigned origin) {
     if (genome.empty() || plan.newborns.size() >= settings_.population) return;
     Newborn newborn;
     newborn.individual.birth_id = next_birth();
-    newborn.individual.genome = breeder_.space().snapped(genome);
+    newborn.individual.genome = space_.snapped(genome);
     newborn.individual.origin = origin;
     plan.newborns.push_back(std::move(newborn));
   };
@@ -171,7 +186,7 @@ void GeneticAlgorithm::add_random(Plan& plan) {
     Newborn newborn;
     newborn.individual.birth_id = next_birth();
     Stream stream = stream_of(newborn.individual.birth_id);
-    newborn.individual.genome = breeder_.space().random(stream);
+    newborn.individual.genome = space_.random(stream);
     newborn.individual.origin = kRandom;
     plan.newborns.push_back(std::move(newborn));
   }
@@ -198,17 +213,9 @@ void GeneticAlgorithm::add_children(Plan& plan) {
   }
 }
 
-unsigned GeneticAlgorithm::full_scores() const {
-  return noisy_ ? std::max(1U, settings_.elite_replicates) : 1;
-}
-
-bool GeneticAlgorithm::fully_scored(const Standing& standing) const {
-  return standing.scores >= full_scores();
-}
-
 std::vector<Individual> GeneticAlgorithm::choose_elites() const {
   std::size_t count = settings_.elitism;
-  if (full_scores() > 1 && count > 0) count = std::max<std::size_t>(count, 2);
+  if (full_scores_ > 1 && count > 0) count = std::max<std::size_t>(count, 2);
   count = std::min<std::size_t>(count, settings_.population - 1);
   std::vector<Individual> elites;
   const auto take = [&](const Individual& individual) {
@@ -232,7 +239,7 @@ bool GeneticAlgorithm::restart_due() const {
 void GeneticAlgorithm::add_candidates(Plan& plan) const {
   for (const Individual& elite : plan.elites) {
     if (elite.standing.outcome != v1::OK) continue;
-    for (unsigned k = elite.standing.scores; k < full_scores(); ++k) {
+    for (unsigned k = elite.standing.scores; k < full_scores_; ++k) {
       plan.candidates.push_back({elite.birth_id, k, elite.genome});
     }
   }
@@ -249,7 +256,7 @@ void GeneticAlgorithm::take_scores(Plan& plan, std::span<const Score> scores) {
   auto next = scores.begin();
   for (Individual& elite : plan.elites) {
     if (elite.standing.outcome == v1::OK) {
-      for (unsigned k = elite.standing.scores; k < full_scores(); ++k) elite.standing.add(*next++);
+      for (unsigned k = elite.standing.scores; k < full_scores_; ++k) elite.standing.add(*next++);
     }
     seen_.remember(elite.genome, elite.standing);
   }
@@ -284,33 +291,18 @@ void GeneticAlgorithm::learn(const Plan& plan) {
   breeder_.learn(children);
 }
 
-// The best individual so far.  Under noise a full set of scores outranks any lower cost, and the
-// old best is judged by what its re-scoring has shown.
-void GeneticAlgorithm::update_best() {
-  const auto preferred = [this](const Individual& a, const Individual& b) {
-    const bool a_ok = a.standing.outcome == v1::OK, b_ok = b.standing.outcome == v1::OK;
-    if (a_ok && b_ok && fully_scored(a.standing) != fully_scored(b.standing)) {
-      return fully_scored(a.standing);
-    }
-    return better(a.standing, b.standing);
-  };
-  const bool first = generation_ == 1;
-  if (first) best_ = population_.front();
-  for (const Individual& individual : population_) {
-    if (individual.birth_id == best_.birth_id) best_.standing = individual.standing;
-  }
-  const Standing before = best_.standing;
-  for (const Individual& individual : population_) {
-    if (preferred(individual, best_)) best_ = individual;
-  }
-  if (first || better(best_.standing, before)) last_improvement_ = generation_;
-}
-
 std::vector<Individual> GeneticAlgorithm::members() const {
   std::vector<Individual> members = population_;
   std::ranges::stable_partition(
       members, [&](const Individual& member) { return member.birth_id == best_.birth_id; });
   return members;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Optimiser>> make_genetic(const OptimiserSetup& setup) {
+  if (const Status status = check(setup); !status) return status.error();
+  return std::unique_ptr<Optimiser>(std::make_unique<GeneticAlgorithm>(setup));
 }
 
 }  // namespace gapfarm

@@ -1,5 +1,3 @@
-#include "master/evolve/genetic/nsga2.h"
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -8,6 +6,7 @@
 
 #include "common/base/try.h"
 #include "common/math/fronts.h"
+#include "master/evolve/genetic/genetic.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {
@@ -57,15 +56,13 @@ double polynomial(double g, double draw) {
   return g + 1 - std::pow(2 - 2 * draw + (2 * draw - 1) * std::pow(g, power), 1 / power);
 }
 
-class Nsga2 final : public Optimiser {
+class Nsga2 final : public CountingOptimiser {
  public:
   explicit Nsga2(const OptimiserSetup& setup)
-      : space_(*setup.table, setup.genes),
+      : CountingOptimiser(setup),
         given_(setup.given),
-        run_seed_(setup.run_seed),
         size_(
-            std::max(4U, setup.settings.optimiser.population.value_or(setup.settings.population))),
-        full_scores_(setup.noisy ? std::max(1U, setup.settings.elite_replicates) : 1) {
+            std::max(4U, setup.settings.optimiser.population.value_or(setup.settings.population))) {
     if (setup.settings.seed_nominal && !setup.nominal.empty()) {
       given_.insert(given_.begin(), setup.nominal);
     }
@@ -74,12 +71,7 @@ class Nsga2 final : public Optimiser {
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
 
-  std::uint64_t generation() const override { return generation_; }
-  std::uint64_t evaluations() const override { return evaluations_; }
-  std::uint64_t last_improvement() const override { return last_improvement_; }
   std::vector<Individual> members() const override;
-  const Individual& best() const override { return best_; }
-  double diversity() const override { return diversity_of(population_); }
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string state() const override;
   Status restore(std::string_view state) override;
@@ -99,19 +91,14 @@ class Nsga2 final : public Optimiser {
   void select(std::vector<Individual> all);
   void take(std::vector<Individual> front);
   std::vector<Costs> front() const;
+  std::vector<Costs> costs_of_all() const;  // that ended well
   void note_best();
 
-  GeneSpace space_;
   std::vector<Genome> given_;  // of the first generation
-  std::uint64_t run_seed_;
   std::size_t size_;
-  unsigned full_scores_;
 
-  std::uint64_t generation_ = 0, next_birth_id_ = 0, evaluations_ = 0, last_improvement_ = 0;
-  std::vector<Individual> population_;  // best first
-  std::size_t front_size_ = 0;          // of them, where it ended well
-  Costs reference_;                     // empty: nothing ended well yet
-  Individual best_;
+  std::size_t front_size_ = 0;  // of them, where it ended well
+  Costs reference_;             // empty: nothing ended well yet
   std::optional<Plan> plan_;
 };
 
@@ -139,10 +126,7 @@ void Nsga2::mutate(Individual& child, bool must, Stream& stream) const {
 
 void Nsga2::add_pair(Plan& plan, std::set<Genome>& known) const {
   const std::uint64_t birth_id = next_birth_id_ + plan.births;
-  Stream stream({.run_seed = run_seed_,
-                 .purpose = Purpose::kEvolution,
-                 .generation = generation_ + 1,
-                 .birth_id = birth_id});
+  Stream stream = stream_of(birth_id);
   Individual pair[2];
   if (!population_.empty()) {
     const Individual& a = population_[tournament(stream)];
@@ -263,15 +247,19 @@ std::vector<Costs> Nsga2::front() const {
   return front;
 }
 
-void Nsga2::note_best() {
-  const std::vector<Costs> best = front();
-  best_ = population_[best.empty() ? 0 : knee_of(best)];
-  if (!reference_.empty() || best.empty()) return;
+std::vector<Costs> Nsga2::costs_of_all() const {
   std::vector<Costs> ended_well;
   for (const Individual& member : population_) {
     if (member.standing.outcome == v1::OK) ended_well.push_back(costs_of(member.standing));
   }
-  reference_ = greatest_of(ended_well);
+  return ended_well;
+}
+
+void Nsga2::note_best() {
+  const std::vector<Costs> best = front();
+  best_ = population_[best.empty() ? 0 : knee_of(best)];
+  if (!reference_.empty() || best.empty()) return;
+  reference_ = greatest_of(costs_of_all());
 }
 
 std::vector<Individual> Nsga2::members() const {
@@ -293,40 +281,21 @@ std::vector<NamedNumber> Nsga2::operator_probabilities() const {
 std::string Nsga2::state() const {
   assert(!plan_ && "save between tell() and ask()");
   v1::GeneticState message;
-  message.set_generation(generation_);
-  message.set_next_birth_id(next_birth_id_);
-  message.set_evaluations(evaluations_);
-  message.set_last_improvement(last_improvement_);
+  save_counts(false, message);
   message.mutable_reference()->Add(reference_.begin(), reference_.end());
-  for (const Individual& individual : population_) save(individual, *message.add_population());
   return message.SerializeAsString();
 }
 
 Status Nsga2::restore(std::string_view state) {
   ASSIGN_OR_RETURN(const auto message, parse_state<v1::GeneticState>(state));
-  if (message.generation() > 0 && message.population_size() == 0) {
-    return Error{"the saved optimiser state is damaged: it has no population"};
-  }
-  generation_ = message.generation();
-  next_birth_id_ = message.next_birth_id();
-  evaluations_ = message.evaluations();
-  last_improvement_ = message.last_improvement();
+  RETURN_IF_ERROR(restore_counts(false, message));
   reference_.assign(message.reference().begin(), message.reference().end());
-  std::vector<Individual> saved;
-  for (const v1::Individual& one : message.population()) {
-    ASSIGN_OR_RETURN(Individual individual, load(one, space_));
-    const bool ended_well = individual.standing.outcome == v1::OK;
-    if (ended_well && costs_of(individual.standing).size() != reference_.size()) {
-      return Error{
-          "the saved optimiser state is damaged or of other objectives; resume with the "
-          "config of the run"};
-    }
-    saved.push_back(std::move(individual));
-  }
-  population_ = std::move(saved);
-  std::vector<Costs> ended_well;
-  for (const Individual& member : population_) {
-    if (member.standing.outcome == v1::OK) ended_well.push_back(costs_of(member.standing));
+  const std::vector<Costs> ended_well = costs_of_all();
+  if (std::ranges::any_of(ended_well,
+                          [&](const Costs& costs) { return costs.size() != reference_.size(); })) {
+    return Error{
+        "the saved optimiser state is damaged or of other objectives; resume with the "
+        "config of the run"};
   }
   front_size_ = first_front(ended_well).size();
   if (!population_.empty()) note_best();

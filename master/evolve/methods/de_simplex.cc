@@ -1,10 +1,48 @@
-#include "master/evolve/methods/de_simplex.h"
-
+// The hybrid of Weitnauer, Haschke and Ritter (2010): some iterations of differential evolution,
+// then a simplex from the best.  When the simplex has converged, all of it begins again.
 #include <algorithm>
 
 #include "common/base/try.h"
+#include "master/evolve/methods/differential_evolution.h"
+#include "master/evolve/methods/local_search.h"
 
 namespace gapfarm {
+namespace {
+
+class DeSimplex final : public SearchMethod {
+ public:
+  explicit DeSimplex(MethodSetup setup)
+      : setup_(with_fixed_rates(std::move(setup))),
+        differential_(setup_),
+        simplex_(setup_, false) {}
+
+  std::vector<Genome> propose(const StreamOf& stream_of) const override {
+    return current().propose(stream_of);
+  }
+  void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
+  unsigned origin() const override { return current().origin(); }
+  std::vector<NamedNumber> figures() const override;
+  bool compares_scores() const override { return true; }
+  std::vector<Standing> compared() const override { return current().compared(); }
+  void settle() override {
+    if (polishing_) simplex_.settle();
+  }
+  std::span<Individual> incumbents() override {
+    return polishing_ ? simplex_.incumbents() : differential_.incumbents();
+  }
+  void save(v1::MethodState& message) const override;
+  Status restore(const v1::MethodState& message) override;
+
+ private:
+  static MethodSetup with_fixed_rates(MethodSetup setup);
+  const SearchMethod& current() const;
+
+  MethodSetup setup_;
+  bool polishing_ = false;
+  std::uint64_t rounds_ = 0;
+  DifferentialEvolution differential_;
+  LocalSearch simplex_;
+};
 
 // As the hybrid was described: differential evolution does not adapt itself.
 MethodSetup DeSimplex::with_fixed_rates(MethodSetup setup) {
@@ -16,10 +54,6 @@ MethodSetup DeSimplex::with_fixed_rates(MethodSetup setup) {
 const SearchMethod& DeSimplex::current() const {
   if (polishing_) return simplex_;
   return differential_;
-}
-
-std::vector<Genome> DeSimplex::propose(const StreamOf& stream_of) const {
-  return current().propose(stream_of);
 }
 
 void DeSimplex::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
@@ -64,6 +98,8 @@ Status DeSimplex::restore(const v1::MethodState& message) {
   RETURN_IF_ERROR(differential_.restore(state.differential()));
   return simplex_.restore(state.simplex());
 }
+
+}  // namespace
 
 GAPFARM_METHOD(DeSimplex)
 

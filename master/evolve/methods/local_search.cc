@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <condition_variable>
 #include <mutex>
 #include <thread>

@@ -26,19 +26,7 @@ Error damaged_method_state(const std::string& method) {
 
 SearchOptimiser::SearchOptimiser(std::string kind, const OptimiserSetup& setup,
                                  std::unique_ptr<SearchMethod> method)
-    : kind_(std::move(kind)),
-      space_(*setup.table, setup.genes),
-      run_seed_(setup.run_seed),
-      noisy_(setup.noisy),
-      elite_replicates_(setup.settings.elite_replicates),
-      method_(std::move(method)),
-      next_birth_id_(setup.first_birth),
-      births_apart_(setup.births_apart),
-      seen_(setup.remembered) {}
-
-unsigned SearchOptimiser::full_scores() const {
-  return noisy_ ? std::max(1U, elite_replicates_) : 1;
-}
+    : CountingOptimiser(setup), kind_(std::move(kind)), method_(std::move(method)) {}
 
 // The best of them takes the place of a proposal, unless the own best is better.
 void SearchOptimiser::meet(std::span<const std::vector<Individual>> others) {
@@ -60,12 +48,8 @@ std::vector<Candidate> SearchOptimiser::ask() {
 SearchOptimiser::Plan SearchOptimiser::plan_generation() const {
   Plan plan;
   add_rescored(plan);
-  plan.proposed = method_->propose([this](std::size_t k) {
-    return Stream({.run_seed = run_seed_,
-                   .purpose = Purpose::kEvolution,
-                   .generation = generation_ + 1,
-                   .birth_id = next_birth_id_ + k * births_apart_});
-  });
+  plan.proposed = method_->propose(
+      [this](std::size_t k) { return stream_of(next_birth_id_ + k * births_apart_); });
   const unsigned wanted = replicates() ? wanted_scores() : 1;
   const std::span<Individual> incumbents = method_->incumbents();
   for (std::size_t i = 0; i < incumbents.size() && replicates(); ++i) {
@@ -94,15 +78,15 @@ SearchOptimiser::Plan SearchOptimiser::plan_generation() const {
 }
 
 void SearchOptimiser::add_rescored(Plan& plan) const {
-  if (generation_ == 0 || full_scores() == 1) return;
+  if (generation_ == 0 || full_scores_ == 1) return;
   plan.rescored.push_back(best_);
-  if (!round_.empty() && round_.front().genome != best_.genome) {
-    plan.rescored.push_back(round_.front());
+  if (!population_.empty() && population_.front().genome != best_.genome) {
+    plan.rescored.push_back(population_.front());
   }
   for (std::size_t i = 0; i < plan.rescored.size(); ++i) {
     const Standing& standing = plan.rescored[i].standing;
-    if (standing.outcome != v1::OK || standing.scores >= full_scores()) continue;
-    request(plan, {Whose::kTitle, i}, full_scores() - standing.scores);
+    if (standing.outcome != v1::OK || standing.scores >= full_scores_) continue;
+    request(plan, {Whose::kTitle, i}, full_scores_ - standing.scores);
   }
 }
 
@@ -131,7 +115,7 @@ double SearchOptimiser::noise_variance() const {
     freedom += standing.scores - 1;
   };
   for (const Individual& individual : method_->incumbents()) pool(individual);
-  for (const Individual& individual : round_) pool(individual);
+  for (const Individual& individual : population_) pool(individual);
   if (generation_ > 0) pool(best_);
   return freedom > 0 ? squares / freedom : 0;
 }
@@ -152,10 +136,10 @@ SearchOptimiser::Spread SearchOptimiser::spread_of_compared() const {
 
 unsigned SearchOptimiser::wanted_scores() const {
   const Spread spread = spread_of_compared();
-  if (spread.count < 2) return std::min(2U, full_scores());
+  if (spread.count < 2) return std::min(2U, full_scores_);
   const double between = spread.variance - spread.of_noise, noise = noise_variance();
-  const double most = full_scores();
-  if (4 * noise >= most * between) return full_scores();
+  const double most = full_scores_;
+  if (4 * noise >= most * between) return full_scores_;
   return std::max(1U, static_cast<unsigned>(std::ceil(4 * noise / between)));
 }
 
@@ -206,7 +190,7 @@ void SearchOptimiser::tell(std::span<const Score> scores) {
   std::vector<Standing> standings;
   for (const Individual& individual : plan.individuals) standings.push_back(individual.standing);
   method_->learn(plan.proposed, standings);
-  const double indistinct = 1.5 * noise_variance() / full_scores();
+  const double indistinct = 1.5 * noise_variance() / full_scores_;
   if (const Spread spread = spread_of_compared();
       replicates() && spread.count > 1 && spread.variance <= indistinct) {
     method_->settle();
@@ -218,35 +202,17 @@ void SearchOptimiser::tell(std::span<const Score> scores) {
       incumbents[k].birth_id = plan.individuals[k].birth_id;
   }
   next_birth_id_ += plan.individuals.size() * births_apart_;
-  if (proposed_ == 0) round_.clear();
+  if (proposed_ == 0) population_.clear();
   proposed_ += plan.individuals.size();
-  for (Individual& individual : plan.individuals) round_.push_back(std::move(individual));
-  for (Individual& individual : plan.rescored) round_.push_back(std::move(individual));
-  sort_best_first(round_);
+  for (Individual& individual : plan.individuals) population_.push_back(std::move(individual));
+  for (Individual& individual : plan.rescored) population_.push_back(std::move(individual));
+  sort_best_first(population_);
   seen_.trim();
-  update_best();
+  update_best(generation_ + 1);
   if (proposed_ < method_->generation_size()) return;
   ++generation_;
   proposed_ = 0;
   complete_best_ = best_;
-}
-
-bool SearchOptimiser::preferred(const Standing& a, const Standing& b) const {
-  if (a.outcome == v1::OK && b.outcome == v1::OK) {
-    const bool a_full = a.scores >= full_scores(), b_full = b.scores >= full_scores();
-    if (a_full != b_full) return a_full;
-  }
-  return better(a, b);
-}
-
-void SearchOptimiser::update_best() {
-  const bool first = best_.genome.empty();
-  if (first) best_ = round_.front();
-  const Standing before = best_.standing;
-  for (const Individual& individual : round_) {
-    if (preferred(individual.standing, best_.standing)) best_ = individual;
-  }
-  if (first || better(best_.standing, before)) last_improvement_ = generation_ + 1;
 }
 
 std::vector<NamedNumber> SearchOptimiser::operator_probabilities() const {
@@ -259,13 +225,13 @@ std::vector<NamedNumber> SearchOptimiser::operator_probabilities() const {
 std::string SearchOptimiser::reason() const {
   if (!replicates() || !method_->reason().empty()) return method_->reason();
   return "scores are noisy: what \"" + kind_ + "\" compares is scored again where the difference " +
-         "may be noise, up to " + std::to_string(full_scores()) + " times (elite_replicates)";
+         "may be noise, up to " + std::to_string(full_scores_) + " times (elite_replicates)";
 }
 
 std::vector<Individual> SearchOptimiser::members() const {
   std::vector<Individual> members;
   if (generation_ > 0) members.push_back(complete_best_);
-  for (const Individual& individual : round_) {
+  for (const Individual& individual : population_) {
     if (individual.birth_id != best_.birth_id) members.push_back(individual);
   }
   return members;
@@ -275,14 +241,7 @@ std::string SearchOptimiser::state() const {
   assert(!plan_ && proposed_ == 0 && "save between tell() and ask()");
   v1::SearchState message;
   message.set_kind(kind_);
-  v1::GeneticState& ledger = *message.mutable_ledger();
-  ledger.set_generation(generation_);
-  ledger.set_next_birth_id(next_birth_id_);
-  ledger.set_evaluations(evaluations_);
-  ledger.set_last_improvement(last_improvement_);
-  for (const Individual& individual : round_) save(individual, *ledger.add_population());
-  if (generation_ > 0) save(best_, *ledger.add_hall());
-  save_seen(seen_, noisy_, ledger);
+  save_counts(true, *message.mutable_ledger());
   method_->save(*message.mutable_method());
   return message.SerializeAsString();
 }
@@ -299,24 +258,8 @@ Status SearchOptimiser::restore(std::string_view state) {
                  "\" was written before gapfarm 0.3 and is not continued; `gapfarm report` and "
                  "`determine` read the run as it is, `evolve` begins it again"};
   }
-  const v1::GeneticState& ledger = message.ledger();
-  if (ledger.generation() > 0 && ledger.hall_size() == 0) {
-    return Error{"the saved optimiser state is damaged: it has no best"};
-  }
-  RETURN_IF_ERROR(load_seen(ledger, seen_));
-  for (const v1::Individual& saved : ledger.population()) {
-    ASSIGN_OR_RETURN(Individual individual, load(saved, space_));
-    round_.push_back(std::move(individual));
-  }
-  if (ledger.generation() > 0) {
-    ASSIGN_OR_RETURN(Individual best, load(ledger.hall(0), space_));
-    best_ = std::move(best);
-    complete_best_ = best_;
-  }
-  generation_ = ledger.generation();
-  next_birth_id_ = ledger.next_birth_id();
-  evaluations_ = ledger.evaluations();
-  last_improvement_ = ledger.last_improvement();
+  RETURN_IF_ERROR(restore_counts(true, message.ledger()));
+  complete_best_ = best_;
   return method_->restore(message.method());
 }
 

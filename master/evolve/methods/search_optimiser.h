@@ -23,7 +23,7 @@
 
 namespace gapfarm {
 
-class SearchOptimiser final : public Optimiser {
+class SearchOptimiser final : public CountingOptimiser {
  public:
   SearchOptimiser(std::string kind, const OptimiserSetup& setup,
                   std::unique_ptr<SearchMethod> method);
@@ -32,12 +32,8 @@ class SearchOptimiser final : public Optimiser {
   void tell(std::span<const Score> scores) override;
   void meet(std::span<const std::vector<Individual>> others) override;
 
-  std::uint64_t generation() const override { return generation_; }
-  std::uint64_t evaluations() const override { return evaluations_; }
-  std::uint64_t last_improvement() const override { return last_improvement_; }
   std::vector<Individual> members() const override;  // the generation's proposals and the best
   const Individual& best() const override { return complete_best_; }
-  double diversity() const override { return diversity_of(round_); }
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string reason() const override;
   std::string state() const override;
@@ -71,27 +67,13 @@ class SearchOptimiser final : public Optimiser {
   };
   Spread spread_of_compared() const;
   unsigned wanted_scores() const;
-  unsigned full_scores() const;
-  bool preferred(const Standing& a, const Standing& b) const;
-  void update_best();
 
   std::string kind_;
-  GeneSpace space_;
-  std::uint64_t run_seed_;
-  bool noisy_;
-  unsigned elite_replicates_;
   std::unique_ptr<SearchMethod> method_;
 
-  std::uint64_t generation_ = 0;
-  std::uint64_t next_birth_id_;
-  std::uint64_t births_apart_;
-  std::uint64_t evaluations_ = 0;
-  std::uint64_t last_improvement_ = 0;
-  std::vector<Individual> round_;  // the last generation's or this one's so far, best first
-  std::size_t proposed_ = 0;       // of a generation that is not complete
-  Individual best_;
+  // The population is the last generation's proposals, or this one's so far.
+  std::size_t proposed_ = 0;  // of a generation that is not complete
   Individual complete_best_;  // of the generations that are complete
-  SeenGenomes seen_;
   Genome migrant_;            // of the next generation; empty: none
   std::optional<Plan> plan_;  // asked for, without scores yet
 };

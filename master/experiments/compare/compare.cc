@@ -6,7 +6,6 @@
 #include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "master/evolve/optimisers.h"
-#include "master/evolve/staged.h"
 
 namespace gapfarm {
 namespace {

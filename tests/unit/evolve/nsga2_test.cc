@@ -1,5 +1,3 @@
-#include "master/evolve/genetic/nsga2.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <set>
 
 #include "common/random/stream.h"
+#include "master/evolve/genetic/genetic.h"
 #include "tests/unit/evolve/front_functions.h"
 #include "tests/unit/evolve/members_digest.h"
 

@@ -1,4 +1,3 @@
-#include "master/evolve/staged.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
