@@ -8,7 +8,6 @@
 
 #include "common/base/hash.h"
 #include "common/base/try.h"
-#include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "worker/fitness.h"
 #include "worker/scenarios/outcome.h"

@@ -1,6 +1,5 @@
 #include "worker/fitness.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/base/try.h"

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -39,5 +40,20 @@ inline std::string_view trimmed(std::string_view text) {
   if (begin == text.npos) return {};
   return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
+
+// A word of a shell command, for whoever pastes one: quoted only where a shell would take it for
+// more than one word.
+std::string shell_quoted(const std::string& word);
+
+// Names as people count them: "run2" before "run10".  Of other characters by their bytes, so that
+// letters of UTF-8 come after ASCII's.
+bool comes_before(const std::string& a, const std::string& b);
+
+// The known word with the least edit distance (a swap of neighbours is one edit) to `word`, when
+// that is at most a third of the longer word's length (at least 1); empty otherwise.
+std::string nearest_word(std::string_view word, std::span<const std::string> known);
+
+// "; did you mean 'forward'?" or, when nothing is near, "; known: a, b, c".
+std::string suggestion(std::string_view word, std::span<const std::string> known);
 
 }  // namespace gapfarm

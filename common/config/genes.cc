@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
 #include "common/base/text.h"
 #include "common/config/sections.h"
 #include "common/trials/text/csv.h"

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
 

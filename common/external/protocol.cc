@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/external/line_json.h"
 #include "common/json/json.h"

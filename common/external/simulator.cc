@@ -13,7 +13,6 @@
 #include <cerrno>
 #include <cmath>
 
-#include "common/base/shell.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/external/line_json.h"

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "common/base/hash.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/problem/message_parts.h"
 #include "common/problem/run_files.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,6 @@
 
 #include "common/base/ranges.h"
 #include "common/score/density.h"
-#include "common/score/fitness.h"
 
 namespace gapfarm {
 namespace {

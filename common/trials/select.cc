@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {

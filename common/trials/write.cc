@@ -3,7 +3,6 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
-#include <string_view>
 #include <utility>
 
 #include "common/base/text.h"

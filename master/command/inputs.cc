@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "common/base/build_info.h"
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"

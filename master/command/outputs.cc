@@ -11,7 +11,7 @@
 #include <fstream>
 #include <string_view>
 
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/files.h"

@@ -13,7 +13,7 @@
 #include <string_view>
 
 #include "common/base/clock.h"
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/command/context.h"

@@ -7,7 +7,7 @@
 
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"

@@ -1,7 +1,6 @@
 // What the rest of the master sees of the farm: tasks in, results out, in the tasks' order.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <functional>
 #include <iterator>

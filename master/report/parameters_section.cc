@@ -1,5 +1,3 @@
-#include "master/report/parameters_section.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include "common/base/ranges.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
+#include "master/report/report_sections.h"
 
 namespace gapfarm {
 namespace {

@@ -12,7 +12,6 @@
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/report/parameters_section.h"
 #include "master/report/report_sections.h"
 
 namespace gapfarm {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <ctime>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <set>
 #include <utility>
@@ -13,7 +12,6 @@
 #include "common/base/try.h"
 #include "common/progress/number_text.h"
 #include "master/report/html.h"
-#include "master/run/run_sample.h"
 #include "master/store/run_lock.h"
 
 namespace gapfarm {

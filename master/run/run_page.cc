@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "common/base/hash.h"
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/model.h"

@@ -1,5 +1,3 @@
-#include "master/run/run_sample.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include "common/math/rank_tests.h"
 #include "common/trials/text/csv.h"
 #include "master/report/html.h"
+#include "master/run/run_history.h"
 
 namespace gapfarm {
 namespace {

@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "common/base/build_info.h"
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/store/run_reader.h"

@@ -6,7 +6,6 @@
 #include <limits>
 #include <numbers>
 
-#include "common/base/suggest.h"
 #include "common/base/text.h"
 #include "common/pose/pose.h"
 #include "common/trials/dialect.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"

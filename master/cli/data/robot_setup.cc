@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "common/base/ranges.h"
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/robot/robot_file.h"
 #include "common/trials/files.h"

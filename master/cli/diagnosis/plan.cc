@@ -16,7 +16,6 @@
 #include "master/command/outputs.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/experiments/plan/design.h"
-#include "master/experiments/plan/picture.h"
 
 namespace gapfarm {
 namespace {

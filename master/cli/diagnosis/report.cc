@@ -11,8 +11,8 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/report_html.h"
 #include "master/report/run/run_report.h"
+#include "master/run/run_history.h"
 #include "master/run/run_page.h"
-#include "master/run/run_sample.h"
 
 namespace gapfarm {
 namespace {

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/hash.h"
-#include "common/base/natural_order.h"
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "master/command/long_command.h"

@@ -1,7 +1,5 @@
 // gapfarm evolve CONFIG: evolve parameters against a trial log.
-#include <spdlog/fmt/fmt.h>
 
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "master/command/context.h"
-#include "master/farm/sites/fleet_loop.h"
+#include "master/farm/sites/fleet.h"
 
 namespace gapfarm {
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/trials/text/csv.h"

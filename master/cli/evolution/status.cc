@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/cli/subcommand.h"

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/trials/read.h"
 #include "common/trials/waypoint_log.h"

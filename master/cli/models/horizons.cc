@@ -7,7 +7,6 @@
 
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
-#include "common/recordings/read.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"

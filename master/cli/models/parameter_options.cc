@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 
 namespace gapfarm {
 namespace {

@@ -1,7 +1,6 @@
 // gapfarm predict RUN|MODEL: the predictive distribution of every trial of a log.
 #include <spdlog/fmt/fmt.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <filesystem>
 #include <memory>

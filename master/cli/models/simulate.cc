@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/trials/read.h"
 #include "common/trials/select.h"

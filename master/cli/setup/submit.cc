@@ -5,7 +5,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/shell.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/net/keys.h"

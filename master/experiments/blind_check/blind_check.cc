@@ -9,7 +9,6 @@
 #include "common/trials/write.h"
 #include "master/experiments/blind_check/cases/seal.h"
 #include "master/experiments/blind_check/folder.h"
-#include "master/experiments/blind_check/score.h"
 #include "master/experiments/blind_check/tally.h"
 
 namespace gapfarm {

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "master/diagnose/subject.h"
 #include "master/experiments/plan/visibility.h"

@@ -9,6 +9,7 @@
 
 #include "common/base/result.h"
 #include "common/config/settings.h"
+#include "common/problem/problem.h"
 #include "common/progress/overall_progress.h"
 #include "common/trials/trial.h"
 #include "master/experiments/plan/visibility.h"
@@ -54,5 +55,9 @@ struct DesignedPlan {
 // robot that does not drive.
 Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSettings& settings,
                                  const StageHooks& hooks = {});
+
+// From above: a dot where the robot is put down, an arrow from each start to where the model says
+// that it stops, a colour a command; beside it the power by number of trials, planned and random.
+std::string plan_picture(const Problem& problem, const DesignedPlan& plan);
 
 }  // namespace gapfarm::plan

@@ -1,10 +1,9 @@
-#include "master/experiments/plan/picture.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "common/pose/extent.h"
 #include "common/svg/svg.h"
+#include "master/experiments/plan/design.h"
 #include "master/report/figures/line_chart.h"
 
 namespace gapfarm::plan {

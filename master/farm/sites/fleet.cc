@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "common/base/ranges.h"
-#include "common/base/shell.h"
 #include "common/base/text.h"
 
 namespace gapfarm {

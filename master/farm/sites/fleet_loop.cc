@@ -1,5 +1,3 @@
-#include "master/farm/sites/fleet_loop.h"
-
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -11,6 +9,7 @@
 #include "common/net/envelope.h"
 #include "common/net/master_wait.h"
 #include "common/net/socket.h"
+#include "master/farm/sites/fleet.h"
 
 namespace gapfarm {
 namespace {

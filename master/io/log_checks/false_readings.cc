@@ -1,5 +1,3 @@
-#include "master/io/log_checks/false_readings.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "common/trials/context.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {

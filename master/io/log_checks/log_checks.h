@@ -1,10 +1,12 @@
-// Checks of a log that do not depend on what moves.
+// Checks of a log: those that do not depend on what moves, then of single readings and of pushes.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/problem/problem.h"
 #include "common/trials/trial.h"
 #include "master/io/log_checks/finding.h"
 
@@ -43,5 +45,31 @@ std::span<const LengthUnit> length_units();
 // The unit in which `logged` comes nearest to `expected_m`, among those that put it into
 // [lower_m, upper_m]; null where none does.
 const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, double expected_m);
+
+// Trials of a log of drives or pushes with a pose that a tracker cannot have seen, since other
+// readings contradict it, ascending.  One that ends where no other of its command does has one
+// - where the next trial's start is where the others lead (the end is false), or the end of the
+//   trial before is where the others begin (the start is);
+// - where its end is, to the last digit, that of others: what a tracker reports that has lost the
+//   robot;
+// - where there are some of these and no other reading confirms its end, in a log whose trials
+//   begin where the one before ends;
+// - where it ends four times as far off as any other, and is one of 200.
+// What was read on the way is late rather than false (pose_latency) unless it is one of few among
+// these; a robot that slipped is seen twice where it is.  Empty where commands have too few
+// repeats, and where there are so many that there is no knowing which readings are false.
+std::vector<std::size_t> false_readings(const Problem& problem);
+
+// Checks of logs of pushed pieces.
+
+// Samples of the fingers' ways between a jump there and one back (check_jumps()).
+struct TipJumps {
+  std::vector<std::size_t> trials;           // that have some, ascending
+  std::vector<SanityFinding> findings = {};  // one at most
+};
+TipJumps check_tip_jumps(const TrialLog& log);
+
+// Nothing moved; or finger and pieces are not in one frame and unit, or not of the same pushes.
+void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings);
 
 }  // namespace gapfarm

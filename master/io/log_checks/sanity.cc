@@ -11,9 +11,7 @@
 #include "common/base/ranges.h"
 #include "common/trials/context.h"
 #include "master/io/log_checks/drive_checks.h"
-#include "master/io/log_checks/false_readings.h"
 #include "master/io/log_checks/log_checks.h"
-#include "master/io/log_checks/push_checks.h"
 
 namespace gapfarm {
 namespace {

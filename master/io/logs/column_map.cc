@@ -10,10 +10,9 @@
 
 #include "common/base/constants.h"
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/config/toml_section.h"
-#include "common/pose/pose.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/text/csv.h"
 

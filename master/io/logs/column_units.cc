@@ -1,13 +1,11 @@
-#include "master/io/logs/column_units.h"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
+#include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {

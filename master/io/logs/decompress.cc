@@ -1,10 +1,9 @@
-#include "master/io/logs/decompress.h"
-
 #include <bzlib.h>
 #include <lz4frame.h>
 #include <zstd.h>
 
 #include "common/trials/text/csv.h"
+#include "master/io/logs/bags.h"
 
 namespace gapfarm {
 namespace {

@@ -1,10 +1,9 @@
-#include "master/io/logs/frames.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 
 #include "common/base/ranges.h"
+#include "master/io/logs/topics.h"
 
 namespace gapfarm {
 namespace {

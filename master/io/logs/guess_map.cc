@@ -6,7 +6,7 @@
 #include "common/math/statistics.h"
 #include "common/recordings/increment_noise.h"
 #include "master/io/logs/column_map.h"
-#include "master/io/logs/frames.h"
+#include "master/io/logs/topics.h"
 
 namespace gapfarm {
 namespace {

@@ -4,7 +4,6 @@
 
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
-#include "master/io/logs/decompress.h"
 #include "master/io/logs/topics.h"
 
 namespace gapfarm {

@@ -9,13 +9,12 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
 #include "common/base/text.h"
 #include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/recordings/read.h"
 #include "common/trials/text/csv.h"
-#include "master/io/logs/column_units.h"
+#include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {

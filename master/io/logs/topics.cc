@@ -3,7 +3,6 @@
 #include <limits>
 
 #include "common/trials/text/csv.h"
-#include "master/io/logs/frames.h"
 
 namespace gapfarm {
 namespace {

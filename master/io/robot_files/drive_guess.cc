@@ -1,5 +1,3 @@
-#include "master/io/robot_files/drive_guess.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -7,6 +5,7 @@
 
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
+#include "master/io/robot_files/understand.h"
 
 namespace gapfarm {
 namespace {

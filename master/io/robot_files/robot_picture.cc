@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"

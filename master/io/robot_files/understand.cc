@@ -9,7 +9,6 @@
 #include "common/base/try.h"
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/compare_facts.h"
-#include "master/io/robot_files/drive_guess.h"
 #include "master/io/robot_files/urdf/urdf.h"
 
 namespace gapfarm {

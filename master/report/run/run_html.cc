@@ -12,7 +12,7 @@
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/report/parameters_section.h"
+#include "master/report/report_sections.h"
 #include "master/report/run/run_live.h"
 #include "master/report/run/run_report.h"
 

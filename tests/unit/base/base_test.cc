@@ -5,9 +5,8 @@
 #include <vector>
 
 #include "common/base/hash.h"
-#include "common/base/natural_order.h"
 #include "common/base/result.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 
 namespace gapfarm::base_test {
 

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "master/cli/app.h"
 
 namespace gapfarm::usage_test {

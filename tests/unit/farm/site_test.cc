@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "common/base/shell.h"
+#include "common/base/text.h"
 #include "master/farm/sites/fleet.h"
 
 namespace gapfarm::site_test {

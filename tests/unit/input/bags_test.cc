@@ -11,7 +11,6 @@
 #include <numbers>
 
 #include "common/trials/files.h"
-#include "master/io/logs/decompress.h"
 #include "master/io/logs/mcap_writer.h"
 #include "master/io/logs/message.h"
 #include "master/io/logs/to_runs.h"

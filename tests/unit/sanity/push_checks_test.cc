@@ -1,5 +1,4 @@
 // Pushes of a piece that goes straight before the finger, logged with one thing wrong.
-#include "master/io/log_checks/push_checks.h"
 
 #include <gtest/gtest.h>
 

@@ -4,9 +4,8 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 #include "common/base/try.h"
-#include "common/math/statistics.h"
 #include "common/trials/text/csv.h"
 #include "master/farm/planned_trials.h"
 

@@ -8,7 +8,6 @@
 #include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/problem/problem.h"
-#include "common/score/fitness.h"
 #include "master/report/prediction_table.h"
 
 namespace gapfarm {

@@ -8,12 +8,10 @@
 
 #include "common/base/constants.h"
 #include "common/base/ranges.h"
-#include "common/base/suggest.h"
 #include "common/base/text.h"
 #include "common/math/algebra.h"
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/understand.h"
-#include "master/io/robot_files/urdf/urdf_xml.h"
 
 namespace gapfarm {
 namespace {

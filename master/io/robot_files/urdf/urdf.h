@@ -140,4 +140,7 @@ struct MassSum {
 // All joints at zero.
 MassSum sum_masses(const UrdfModel& model, const LinkPoses& poses);
 
+// Everything that the file says, before anybody asked whether it hangs together.
+Result<UrdfModel> read_urdf_xml(std::string_view text, const std::string& file);
+
 }  // namespace gapfarm

@@ -1,10 +1,9 @@
-#include "master/io/robot_files/urdf/urdf_xml.h"
-
 #include <cmath>
 #include <set>
 #include <sstream>
 
 #include "common/trials/text/csv.h"
+#include "master/io/robot_files/urdf/urdf.h"
 #include "master/io/robot_files/urdf/xml_reader.h"
 
 namespace gapfarm {

@@ -1,11 +1,10 @@
-#include "common/base/suggest.h"
+#include "common/base/text.h"
 
 #include <algorithm>
+#include <cctype>
 #include <numeric>
 #include <utility>
 #include <vector>
-
-#include "common/base/text.h"
 
 namespace gapfarm {
 namespace {
@@ -30,6 +29,39 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 }  // namespace
+
+std::string shell_quoted(const std::string& word) {
+  const auto plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) ||
+           std::string("_-./:=@%+,").find(c) != std::string::npos;
+  };
+  if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+bool comes_before(const std::string& a, const std::string& b) {
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!digit(a[i]) || !digit(b[j])) {
+      if (a[i] != b[j]) return std::char_traits<char>::lt(a[i], b[j]);
+      ++i;
+      ++j;
+      continue;
+    }
+    const auto number = [&](const std::string& text, std::size_t* at) {
+      while (*at < text.size() && text[*at] == '0') ++*at;
+      const std::size_t from = *at;
+      while (*at < text.size() && digit(text[*at])) ++*at;
+      return text.substr(from, *at - from);
+    };
+    const std::string x = number(a, &i), y = number(b, &j);
+    if (x != y) return x.size() != y.size() ? x.size() < y.size() : x < y;
+  }
+  return a.size() - i != b.size() - j ? a.size() - i < b.size() - j : a < b;
+}
 
 std::string nearest_word(std::string_view word, std::span<const std::string> known) {
   std::string best;
