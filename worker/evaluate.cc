@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/base/hash.h"
-#include "common/base/try.h"
 #include "common/score/motion_model.h"
 #include "worker/fitness.h"
 #include "worker/scenarios/outcome.h"

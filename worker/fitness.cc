@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "common/base/try.h"
 #include "common/score/density.h"
 
 namespace gapfarm {

@@ -13,7 +13,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
-#include "common/base/try.h"
 #include "common/net/master_wait.h"
 #include "common/net/socket.h"
 #include "worker/evaluate.h"

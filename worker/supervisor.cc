@@ -9,7 +9,6 @@
 #include <cstdio>
 
 #include "common/base/clock.h"
-#include "common/base/try.h"
 
 namespace gapfarm {
 namespace {

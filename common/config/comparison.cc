@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <sstream>
 
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/toml_section.h"
 #include "common/trials/files.h"

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "common/base/build_info.h"
-#include "common/base/try.h"
 #include "common/config/sections.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <optional>
 
-#include "common/base/try.h"
 #include "common/config/sections.h"
 #include "common/problem/run_files.h"
 #include "common/trials/text/csv.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "common/base/try.h"
 #include "common/config/toml_section.h"
 
 namespace gapfarm {

@@ -7,7 +7,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/external/line_json.h"
 #include "common/json/json.h"
 

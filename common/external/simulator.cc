@@ -14,7 +14,6 @@
 #include <cmath>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/external/line_json.h"
 #include "common/process/child.h"
 

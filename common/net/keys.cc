@@ -17,8 +17,6 @@
 #include <sstream>
 #include <zmq.hpp>
 
-#include "common/base/try.h"
-
 namespace gapfarm {
 namespace {
 

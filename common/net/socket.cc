@@ -11,7 +11,6 @@
 #include <zmq.hpp>
 
 #include "common/base/clock.h"
-#include "common/base/try.h"
 #include "common/net/link_guard.h"
 
 namespace gapfarm {

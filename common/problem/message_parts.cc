@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "common/base/try.h"
 #include "common/problem/run_files.h"
 
 namespace gapfarm {

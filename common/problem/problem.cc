@@ -2,7 +2,6 @@
 
 #include <cassert>
 
-#include "common/base/try.h"
 #include "common/robot/robot_file.h"
 
 namespace gapfarm {

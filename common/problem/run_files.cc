@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/recordings/read.h"
 #include "common/recordings/windows.h"
 

@@ -9,7 +9,6 @@
 
 #include "common/base/hash.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/problem/message_parts.h"
 #include "common/problem/run_files.h"
 #include "gapfarm/v1/task.pb.h"

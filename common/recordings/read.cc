@@ -8,7 +8,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"

@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/score/density.h"
 #include "common/score/motion_model.h"

@@ -5,7 +5,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
 #include "common/score/density.h"

@@ -9,7 +9,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
 #include "master/io/log_checks/sanity.h"

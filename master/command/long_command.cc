@@ -15,7 +15,6 @@
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
 #include "common/base/hash.h"
-#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/process/child.h"
 #include "common/trials/files.h"

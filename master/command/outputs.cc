@@ -12,7 +12,6 @@
 #include <string_view>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/files.h"
 #include "common/trials/select.h"

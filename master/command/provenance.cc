@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"
 

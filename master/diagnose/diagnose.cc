@@ -8,7 +8,6 @@
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/progress/stage_clock.h"

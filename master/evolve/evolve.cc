@@ -4,7 +4,6 @@
 #include <sstream>
 #include <unordered_map>
 
-#include "common/base/try.h"
 #include "master/evolve/islands.h"
 #include "master/ground/fit/kinematic_baseline.h"
 

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "common/base/hash.h"
-#include "common/base/try.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,6 @@
 #include <map>
 #include <optional>
 
-#include "common/base/try.h"
 #include "gapfarm/v1/record.pb.h"
 #include "master/evolve/individual.h"
 #include "master/evolve/methods/cma_es.h"

@@ -4,7 +4,6 @@
 #include <array>
 #include <cassert>
 
-#include "common/base/try.h"
 #include "gapfarm/v1/record.pb.h"
 #include "master/evolve/genetic/genetic.h"
 #include "master/evolve/individual.h"

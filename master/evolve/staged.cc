@@ -1,6 +1,5 @@
 #include <cassert>
 
-#include "common/base/try.h"
 #include "gapfarm/v1/record.pb.h"
 #include "master/evolve/individual.h"
 #include "master/evolve/optimisers.h"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/base/try.h"
 #include "gapfarm/v1/problem.pb.h"
 #include "gapfarm/v1/task.pb.h"
 #include "master/farm/sites/fleet_status.h"

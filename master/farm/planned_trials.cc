@@ -7,7 +7,6 @@
 #include <string>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/random/stream.h"
 #include "common/score/motion_model.h"
 #include "master/farm/farm.h"

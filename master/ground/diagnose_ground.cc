@@ -7,7 +7,6 @@
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/progress/stage_clock.h"
 #include "common/robot/robot_file.h"

@@ -10,7 +10,6 @@
 #include <span>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "common/recordings/windows.h"

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/pose/extent.h"
 #include "common/recordings/windows.h"

@@ -10,7 +10,6 @@
 
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "master/ground/catalogue.h"
 #include "master/ground/put_right.h"
 #include "master/ground/reference.h"

@@ -8,7 +8,6 @@
 #include <set>
 #include <utility>
 
-#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "common/base/try.h"
 #include "master/infer/climb.h"
 #include "master/infer/scope.h"
 

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
 

@@ -4,7 +4,6 @@
 #include <numeric>
 #include <set>
 
-#include "common/base/try.h"
 #include "common/math/digits.h"
 #include "common/score/motion_model.h"
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 
 namespace gapfarm::infer {
 

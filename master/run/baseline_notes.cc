@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"
 

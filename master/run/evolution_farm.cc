@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/problem/question.h"
 #include "common/progress/number_text.h"
 #include "master/evolve/individual.h"

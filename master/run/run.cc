@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include "common/base/clock.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"

@@ -9,7 +9,6 @@
 #include <set>
 #include <utility>
 
-#include "common/base/try.h"
 #include "common/progress/number_text.h"
 #include "master/report/html.h"
 #include "master/store/run_lock.h"

@@ -11,7 +11,6 @@
 
 #include "common/base/hash.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/model.h"
 #include "common/config/stages.h"

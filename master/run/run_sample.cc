@@ -5,7 +5,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/math/importance.h"
 #include "common/math/rank_tests.h"

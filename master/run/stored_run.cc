@@ -5,7 +5,6 @@
 #include <type_traits>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
 #include "common/json/json.h"

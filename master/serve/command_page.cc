@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/progress/number_text.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"

@@ -16,8 +16,6 @@
 #include <sstream>
 #include <utility>
 
-#include "common/base/try.h"
-
 namespace gapfarm {
 namespace {
 

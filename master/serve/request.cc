@@ -4,7 +4,6 @@
 #include <array>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 
 namespace gapfarm {
 namespace {

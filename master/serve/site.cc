@@ -4,7 +4,6 @@
 #include <charconv>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/html.h"

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "common/base/hash.h"
-#include "common/base/try.h"
 #include "common/problem/problem.h"
 #include "common/problem/question.h"
 #include "master/store/tables.h"

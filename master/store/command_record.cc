@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "master/store/answer_store.h"

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/base/try.h"
 
 struct sqlite3;
 struct sqlite3_stmt;

@@ -6,7 +6,6 @@
 
 #include "common/base/hash.h"
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/math/fronts.h"

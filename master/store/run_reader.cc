@@ -3,7 +3,6 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "master/store/run_lock.h"

@@ -4,7 +4,6 @@
 #include <iterator>
 #include <system_error>
 
-#include "common/base/try.h"
 #include "master/store/tables.h"
 
 namespace gapfarm {

@@ -9,7 +9,6 @@
 #include "common/base/clock.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/problem/run_files.h"
 #include "common/score/motion_model.h"

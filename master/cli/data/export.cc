@@ -5,7 +5,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/matrix.h"
 #include "common/trials/files.h"
 #include "master/cli/data/export_source.h"

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/matrix.h"
 #include "common/trials/files.h"
 #include "master/cli/data/export_source.h"

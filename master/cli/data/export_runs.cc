@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/problem/run_files.h"
 #include "master/cli/data/export_source.h"

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/trials/files.h"
 #include "master/ground/reference.h"

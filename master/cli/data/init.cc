@@ -10,7 +10,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"

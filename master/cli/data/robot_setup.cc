@@ -8,7 +8,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/robot/robot_file.h"
 #include "common/trials/files.h"
 #include "master/io/robot_files/compare_facts.h"

@@ -8,7 +8,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/process/process_pool.h"
 #include "common/trials/read.h"

@@ -10,7 +10,6 @@
 #include "common/base/build_info.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/cli/diagnosis/diagnose_command.h"
 #include "master/cli/subcommand.h"

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"

@@ -2,7 +2,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/hash.h"
-#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"
 #include "master/cli/diagnosis/diagnose_command.h"

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/trials/select.h"
 #include "common/trials/write.h"
 #include "master/cli/diagnosis/plan_drive.h"

@@ -11,7 +11,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/parameters/ground.h"
 #include "common/problem/run_files.h"
 #include "common/svg/svg.h"

@@ -3,7 +3,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/progress/number_text.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"

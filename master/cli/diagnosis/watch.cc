@@ -11,7 +11,6 @@
 #include "common/base/hash.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"
 #include "master/cli/diagnosis/diagnose_command.h"

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/json/fields.h"
 #include "common/problem/run_files.h"

@@ -8,7 +8,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "master/command/long_command.h"
 #include "master/run/run.h"

@@ -3,7 +3,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/cli/evolution/evolution.h"
 #include "master/cli/evolution/search_start.h"

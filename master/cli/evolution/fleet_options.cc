@@ -11,7 +11,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
-#include "common/base/try.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "common/trials/files.h"

@@ -6,7 +6,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/write.h"

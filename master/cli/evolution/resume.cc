@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/cli/evolution/evolution.h"
 #include "master/cli/evolution/search_start.h"

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
 #include "common/trials/files.h"

@@ -13,7 +13,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/result.h"
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
 #include "common/json/json.h"

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/cli/subcommand.h"
 #include "master/command/console.h"

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/select.h"
 #include "master/cli/models/parameter_options.h"

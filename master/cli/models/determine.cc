@@ -8,7 +8,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/select.h"
 #include "master/cli/subcommand.h"

@@ -11,7 +11,6 @@
 #include <numbers>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/trials/read.h"
 #include "common/trials/waypoint_log.h"
 #include "master/cli/subcommand.h"

@@ -5,7 +5,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"

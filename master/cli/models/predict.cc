@@ -9,7 +9,6 @@
 #include <tuple>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"

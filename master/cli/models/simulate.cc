@@ -4,7 +4,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/trials/read.h"
 #include "common/trials/select.h"
 #include "common/trials/write.h"

@@ -7,7 +7,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/json/fields.h"
 #include "master/cli/subcommand.h"

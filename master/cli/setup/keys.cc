@@ -6,7 +6,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/net/keys.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
 #include "master/cli/evolution/fleet_options.h"

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/score/fitness.h"
 #include "master/diagnose/conclusions/findings.h"
 

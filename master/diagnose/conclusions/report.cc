@@ -7,7 +7,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/effects/catalogue.h"
 #include "common/math/statistics.h"
 #include "common/score/baselines.h"

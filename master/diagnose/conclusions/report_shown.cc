@@ -6,7 +6,6 @@
 #include <set>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/effect_diagnosis.h"

@@ -5,7 +5,6 @@
 #include <functional>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 
 namespace gapfarm {

@@ -5,7 +5,6 @@
 #include <optional>
 #include <utility>
 
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/slopes.h"

@@ -9,7 +9,6 @@
 #include <tuple>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "master/diagnose/fit/slopes.h"
 
 namespace gapfarm {

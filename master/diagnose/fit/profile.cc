@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
 #include "master/infer/settings.h"

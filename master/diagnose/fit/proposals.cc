@@ -4,7 +4,6 @@
 #include <functional>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/effects/catalogue.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/subject.h"

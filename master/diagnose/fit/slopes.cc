@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "common/base/try.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {

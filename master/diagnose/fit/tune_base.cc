@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/free_commands.h"

@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 
-#include "common/base/try.h"
 #include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/places/seam.h"

@@ -5,7 +5,6 @@
 #include <map>
 #include <vector>
 
-#include "common/base/try.h"
 #include "common/effects/catalogue.h"
 #include "master/diagnose/fit/estimate.h"
 

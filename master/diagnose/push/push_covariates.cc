@@ -2,7 +2,6 @@
 #include <cmath>
 #include <functional>
 
-#include "common/base/try.h"
 #include "common/parameters/push.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/push/push_subject.h"

@@ -6,7 +6,6 @@
 #include <span>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/parameters/push.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/fit/estimate.h"

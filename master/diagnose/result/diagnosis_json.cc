@@ -3,7 +3,6 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/diagnose/result/json_fields.h"
 #include "master/io/log_checks/finding.h"

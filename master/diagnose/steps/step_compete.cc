@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/evidence/noise.h"

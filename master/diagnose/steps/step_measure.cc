@@ -5,7 +5,6 @@
 #include <span>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"

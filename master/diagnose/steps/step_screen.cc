@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/digits.h"
 #include "common/math/laws.h"
 #include "master/diagnose/evidence/noise.h"

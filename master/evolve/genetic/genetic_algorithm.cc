@@ -4,7 +4,6 @@
 #include <unordered_set>
 #include <utility>
 
-#include "common/base/try.h"
 #include "master/evolve/genetic/breeder.h"
 #include "master/evolve/genetic/genetic.h"
 

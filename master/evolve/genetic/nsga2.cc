@@ -4,7 +4,6 @@
 #include <optional>
 #include <set>
 
-#include "common/base/try.h"
 #include "common/math/fronts.h"
 #include "master/evolve/genetic/genetic.h"
 #include "master/evolve/individual.h"

@@ -2,7 +2,6 @@
 // then a simplex from the best.  When the simplex has converged, all of it begins again.
 #include <algorithm>
 
-#include "common/base/try.h"
 #include "master/evolve/methods/differential_evolution.h"
 #include "master/evolve/methods/local_search.h"
 

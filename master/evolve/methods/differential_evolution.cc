@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {

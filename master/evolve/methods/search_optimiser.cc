@@ -5,7 +5,6 @@
 #include <cmath>
 #include <unordered_set>
 
-#include "common/base/try.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {

@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "common/base/hash.h"
-#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "common/trials/write.h"
 #include "master/experiments/blind_check/cases/seal.h"

@@ -15,7 +15,6 @@
 #include <optional>
 
 #include "common/base/clock.h"
-#include "common/base/try.h"
 #include "common/process/child.h"
 #include "master/farm/farm.h"
 

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/config/model.h"
 #include "common/math/statistics.h"
 #include "master/experiments/crossfit/crossfit.h"

@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "master/evolve/optimisers.h"
 
 namespace gapfarm {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/random/stream.h"
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/try.h"
 #include "common/random/stream.h"
 
 namespace gapfarm {

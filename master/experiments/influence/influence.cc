@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/rank_tests.h"
 #include "common/random/stream.h"
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "common/base/try.h"
-
 namespace gapfarm {
 namespace {
 

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 

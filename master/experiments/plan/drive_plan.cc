@@ -7,7 +7,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/random/stream.h"
 #include "master/experiments/plan/drive_knowledge.h"
 #include "master/experiments/plan/visibility.h"

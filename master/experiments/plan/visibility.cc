@@ -6,7 +6,6 @@
 #include <map>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/diagnose/subject.h"

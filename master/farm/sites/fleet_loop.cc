@@ -5,7 +5,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
-#include "common/base/try.h"
 #include "common/net/envelope.h"
 #include "common/net/master_wait.h"
 #include "common/net/socket.h"

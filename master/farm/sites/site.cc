@@ -5,7 +5,6 @@
 #include <regex>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/config/toml_section.h"
 
 namespace gapfarm {

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/score/kinematic_start.h"
 #include "master/ground/fit/kinematic_baseline.h"

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/score/kinematic_start.h"
 

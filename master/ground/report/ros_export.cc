@@ -8,7 +8,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/robot/robot_file.h"
 #include "common/score/kinematic.h"

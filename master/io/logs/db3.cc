@@ -3,7 +3,6 @@
 #include <map>
 #include <memory>
 
-#include "common/base/try.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
 #include "master/io/logs/topics.h"

@@ -1,7 +1,6 @@
 #include <filesystem>
 
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"

@@ -6,7 +6,6 @@
 #include <map>
 
 #include "common/base/ranges.h"
-#include "common/base/try.h"
 #include "common/trials/dialect.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"

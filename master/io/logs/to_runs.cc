@@ -10,7 +10,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/recordings/increment_noise.h"
 #include "common/recordings/read.h"
 #include "common/trials/text/csv.h"

@@ -6,7 +6,6 @@
 #include <numbers>
 #include <set>
 
-#include "common/base/try.h"
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/compare_facts.h"
 #include "master/io/robot_files/urdf/urdf.h"

@@ -5,7 +5,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/base/try.h"
 #include "common/trials/text/csv.h"
 #include "master/farm/planned_trials.h"
 
