@@ -112,9 +112,8 @@ Result<Config> parse_config_of(const Problem& known, std::string_view text,
 
 Result<Config> read_config(const std::string& path) {
   const std::string file = shipped_file(path);
-  auto text = read_text_file(file);
-  if (!text.ok()) return text.error();
-  return parse_config(*text, file, start_program);
+  ASSIGN_OR_RETURN(auto text, read_text_file(file));
+  return parse_config(text, file, start_program);
 }
 
 namespace {

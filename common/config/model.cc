@@ -132,9 +132,8 @@ Status read_model_program(TomlSection& top, Model& model) {
     if (objective) read_objective(*section, model.fitness, model.spread);
     section->finish();
   }
-  ASSIGN_OR_RETURN(auto program,
+  ASSIGN_OR_RETURN(model.external,
                    make_external_program(std::move(command), std::move(introduction), objective));
-  model.external = std::move(program);
   model.values = model.table().nominal();
   return {};
 }
@@ -142,13 +141,12 @@ Status read_model_program(TomlSection& top, Model& model) {
 }  // namespace
 
 Result<Model> nominal_model(std::string_view scenario) {
-  auto table = parameter_table(scenario);
-  if (!table.ok()) return table.error();
+  ASSIGN_OR_RETURN(const auto* table, parameter_table(scenario));
   Model model;
   model.scenario = scenario;
   model.version = build_info().version;
   model.fingerprint = build_info().fingerprint;
-  model.values = (*table)->nominal();
+  model.values = table->nominal();
   model.commands = default_commands(scenario);
   return model;
 }
@@ -226,9 +224,8 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
 }
 
 Result<Model> read_model(const std::string& path) {
-  auto text = read_text_file(path);
-  if (!text.ok()) return text.error();
-  return parse_model(*text, path);
+  ASSIGN_OR_RETURN(auto text, read_text_file(path));
+  return parse_model(text, path);
 }
 
 }  // namespace gapfarm

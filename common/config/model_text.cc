@@ -207,8 +207,7 @@ Status check_model(const Model& model) {
                  std::to_string(table.size())};
   }
   for (std::size_t row = 0; row < table.size(); ++row) {
-    const Status accepted = table.check(row, model.values[row]);
-    if (!accepted.ok()) return accepted;
+    RETURN_IF_ERROR(table.check(row, model.values[row]));
   }
   return check_residual_of(model);
 }

@@ -278,8 +278,7 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line, bool obje
     declaration.channels.push_back(channel.is_string() ? channel.get<std::string>() : "");
   }
   RETURN_IF_ERROR(check_declaration(declaration));
-  ASSIGN_OR_RETURN(const auto inputs, read_inputs(json));
-  declaration.inputs = inputs;
+  ASSIGN_OR_RETURN(declaration.inputs, read_inputs(json));
   return declaration;
 }
 

@@ -123,7 +123,7 @@ Status check_row(const Parameter& p, bool runs) {
 Status check_declaration(const ExternalDeclaration& declaration) {
   const auto& rows = declaration.parameters;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (Status s = check_row(rows[i], !declaration.channels.empty()); !s) return s;
+    RETURN_IF_ERROR(check_row(rows[i], !declaration.channels.empty()));
     for (std::size_t k = 0; k < i; ++k) {
       if (rows[k].key == rows[i].key) {
         return Error{"parameter '" + rows[i].key + "' is declared twice"};

@@ -183,7 +183,7 @@ Status check_tracked(const GroundRobot& robot) {
                  "and use scenario = \"ground\" (docs/ground.md), or say drive = \"tracked\" with "
                  "the treads' contact_length"};
   }
-  if (Status s = check_treads(robot); !s) return s;
+  RETURN_IF_ERROR(check_treads(robot));
   const RobotMotors& m = robot.motors;
   if (!m.full_speed_rad_s) {
     return Error{
@@ -214,10 +214,10 @@ TrackedTable::TrackedTable(const GroundRobot& robot)
 }
 
 Result<std::shared_ptr<const TrackedTable>> make_tracked_table(const GroundRobot& robot) {
-  if (Status s = check_tracked(robot); !s) return s.error();
+  RETURN_IF_ERROR(check_tracked(robot));
   auto table = std::make_shared<const TrackedTable>(robot);
   for (std::size_t row = 0; row < table->values().size(); ++row) {
-    if (Status s = table->table().check(row, table->values()[row]); !s) return s.error();
+    RETURN_IF_ERROR(table->table().check(row, table->values()[row]));
   }
   return table;
 }

@@ -52,14 +52,14 @@ Status read_values(const v1::Problem& message, Problem* problem) {
   }
   for (std::size_t i = 0; i < table.size(); ++i) {
     problem->values.push_back(i < count ? message.values(static_cast<int>(i)) : table[i].nominal);
-    if (Status s = table.check(i, problem->values.back()); !s) return s.error();
+    RETURN_IF_ERROR(table.check(i, problem->values.back()));
   }
   for (const v1::Gene& gene : message.genes()) {
     if (gene.parameter() >= table.size()) {
       return invalid("gene of parameter row " + std::to_string(gene.parameter()));
     }
-    if (Status s = table.check(gene.parameter(), gene.lower()); !s) return s.error();
-    if (Status s = table.check(gene.parameter(), gene.upper()); !s) return s.error();
+    RETURN_IF_ERROR(table.check(gene.parameter(), gene.lower()));
+    RETURN_IF_ERROR(table.check(gene.parameter(), gene.upper()));
     if (gene.lower() > gene.upper() || (gene.log_scale() && gene.lower() <= 0)) {
       return invalid("gene " + table[gene.parameter()].key + " has an empty range");
     }
@@ -191,8 +191,8 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
     if (!bounded || !std::isfinite(trial.t_s.value_or(0))) {
       return invalid(where + ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t");
     }
-    if (Status s = check_tip(trial, !problem->pieces.empty(), where); !s) return s;
-    if (Status s = check_window(trial, *problem, where); !s) return s;
+    RETURN_IF_ERROR(check_tip(trial, !problem->pieces.empty(), where));
+    RETURN_IF_ERROR(check_window(trial, *problem, where));
     problem->log.trials.push_back(std::move(trial));
   }
   return {};

@@ -161,10 +161,9 @@ Result<Captured> run_captured(ChildSetup setup, const std::string& input, double
   setup.in = in.fd();
   setup.out = out.fd();
   setup.err = err.fd();
-  const Result<pid_t> pid = start_child(setup);
-  if (!pid) return pid.error();
+  ASSIGN_OR_RETURN(const auto pid, start_child(setup));
   Captured captured;
-  captured.timed_out = await(*pid, timeout_s, wait, &captured.status);
+  captured.timed_out = await(pid, timeout_s, wait, &captured.status);
   captured.out = out.text();
   captured.err = err.text();
   return captured;

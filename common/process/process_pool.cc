@@ -79,7 +79,7 @@ ProcessPool::~ProcessPool() {
 Status ProcessPool::start(double now) {
   for (unsigned i = 0; i < places_.size(); ++i) {
     places_[i].start_at = now;
-    if (Status status = start_place(places_[i], i); !status) return status;
+    RETURN_IF_ERROR(start_place(places_[i], i));
   }
   return {};
 }

@@ -30,22 +30,21 @@ class RunTable {
   static Result<RunTable> read(const std::string& path, std::span<const std::string> names,
                                const char* format, RowCheck check = nullptr) {
     ASSIGN_OR_RETURN(const auto text, read_text_file(path));
-    auto rows = parse_csv(text, path);
-    if (!rows) return rows.error();
-    if (rows->empty()) return text_error(path, {}, "an empty file", format);
+    ASSIGN_OR_RETURN(auto rows, parse_csv(text, path));
+    if (rows.empty()) return text_error(path, {}, "an empty file", format);
     RunTable table;
     table.check_ = check;
     table.names_ = {"run", "t"};
     table.names_.insert(table.names_.end(), names.begin(), names.end());
-    ASSIGN_OR_RETURN(auto header, CsvHeader::match(rows->front(), table.names_, path, format));
+    ASSIGN_OR_RETURN(auto header, CsvHeader::match(rows.front(), table.names_, path, format));
     std::optional<std::size_t> session;
     for (const std::size_t column : header.extra()) {
-      if (rows->front().fields[column].text == "session") session = column;
+      if (rows.front().fields[column].text == "session") session = column;
     }
-    for (std::size_t i = 1; i < rows->size(); ++i) {
-      const CsvRow& row = (*rows)[i];
-      if (Status s = check_width(row, header, path); !s) return s.error();
-      if (Status s = table.take(row, header, session, path); !s) return s.error();
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      const CsvRow& row = rows[i];
+      RETURN_IF_ERROR(check_width(row, header, path));
+      RETURN_IF_ERROR(table.take(row, header, session, path));
     }
     if (table.rows_.empty()) return text_error(path, {2, 1}, "no rows", format);
     return table;
@@ -88,12 +87,11 @@ class RunTable {
 };
 
 Result<std::vector<std::string>> header_of(const std::string& path) {
-  const auto text = read_text_file(path);
-  if (!text) return text.error();
-  const auto head = parse_csv(std::string_view(*text).substr(0, text->find('\n')), path);
-  if (!head) return head.error();
-  if (head->empty()) return std::vector<std::string>();
-  return mapped(head->front().fields, &CsvField::text);
+  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
+  ASSIGN_OR_RETURN(const auto head,
+                   parse_csv(std::string_view(text).substr(0, text.find('\n')), path));
+  if (head.empty()) return std::vector<std::string>();
+  return mapped(head.front().fields, &CsvField::text);
 }
 
 // The columns of poses: of increments with those of their noise, where the header has some.
@@ -182,9 +180,8 @@ Status check_times(const LoggedRun& run, const std::string& where, double apart_
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels) {
   ASSIGN_OR_RETURN(const auto commands, RunTable::read(commands_path, channels, "a command log"));
-  const auto header = header_of(poses_path);
-  if (!header) return header.error();
-  const std::vector<std::string> columns = pose_columns(*header);
+  ASSIGN_OR_RETURN(const auto header, header_of(poses_path));
+  const std::vector<std::string> columns = pose_columns(header);
   RunLog log;
   log.relative = columns.front() == "dx";
   ASSIGN_OR_RETURN(const auto poses, RunTable::read(poses_path, columns, "a pose log",
@@ -242,20 +239,16 @@ Status read_returns(const std::string& path, RunLog* log) {
 }
 
 Status read_wheel_speeds(const std::string& path, RunLog* log) {
-  auto wheels = header_of(path);
-  if (!wheels) return wheels.error();
-  std::erase_if(*wheels, [](const std::string& name) {
+  ASSIGN_OR_RETURN(auto wheels, header_of(path));
+  std::erase_if(wheels, [](const std::string& name) {
     return name == "session" || name == "run" || name == "t";
   });
-  if (!log->wheel_channels.empty() && log->wheel_channels != *wheels) {
+  if (!log->wheel_channels.empty() && log->wheel_channels != wheels) {
     return Error{path + ": other wheels than the logs before have; give all logs the same columns"};
   }
-  if (Status s = read_beside(path, *wheels, "a log of wheel speeds", nullptr,
-                             &LoggedRun::wheel_speeds, log);
-      !s) {
-    return s;
-  }
-  log->wheel_channels = std::move(*wheels);
+  RETURN_IF_ERROR(
+      read_beside(path, wheels, "a log of wheel speeds", nullptr, &LoggedRun::wheel_speeds, log));
+  log->wheel_channels = std::move(wheels);
   return {};
 }
 

@@ -188,7 +188,7 @@ Status check_residual(const ResidualField& field, std::span<const std::string> c
   for (std::size_t i = 0; i < field.size(); ++i) {
     const ResidualTerm& term = field[i];
     const std::string where = "residual term " + std::to_string(i + 1);
-    if (Status s = check_covariates(term, where); !s) return s;
+    RETURN_IF_ERROR(check_covariates(term, where));
     const auto count = static_cast<std::size_t>(term.centres.rows());
     if (count == 0 || count > kMostResidualCentres) {
       return Error{where + " has " + std::to_string(count) + " centres, expected 1 to " +
@@ -205,7 +205,7 @@ Status check_residual(const ResidualField& field, std::span<const std::string> c
                    residual_frame_names()[static_cast<std::size_t>(term.frame)] +
                    "\" and by_drive = true; that frame has its own measure, so leave by_drive out"};
     }
-    if (Status s = check_weights(term, commands, where); !s) return s;
+    RETURN_IF_ERROR(check_weights(term, commands, where));
   }
   return {};
 }

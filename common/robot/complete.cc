@@ -25,9 +25,9 @@ class Completion {
   explicit Completion(GroundRobot* robot) : r_(*robot) {}
 
   Status run() {
-    if (Status s = wheels(); !s) return s;
-    if (Status s = sizes(); !s) return s;
-    if (Status s = full_speed(); !s) return s;
+    RETURN_IF_ERROR(wheels());
+    RETURN_IF_ERROR(sizes());
+    RETURN_IF_ERROR(full_speed());
     complete_controller(r_);
     return check_robot(r_);
   }
@@ -138,7 +138,7 @@ class Completion {
   }
 
   Status differential() {
-    if (Status s = need_separation(); !s) return s;
+    RETURN_IF_ERROR(need_separation());
     const double half = *separation() / 2;
     if (states_sides()) {
       place(ensure("left"), 0, half);
@@ -168,7 +168,7 @@ class Completion {
   }
 
   Status skid() {
-    if (Status s = need_separation(); !s) return s;
+    RETURN_IF_ERROR(need_separation());
     if (states_sides()) {
       const double c = *separation() / 2;
       const double b = half_base(c);
@@ -192,7 +192,7 @@ class Completion {
   }
 
   Status tracked() {
-    if (Status s = need_separation(); !s) return s;
+    RETURN_IF_ERROR(need_separation());
     const double c = *separation() / 2;
     for (const char* name : {"left", "right"}) {
       RobotWheel& tread = ensure(name);

@@ -50,12 +50,11 @@ Status check_sizes(const GroundRobot& robot) {
   constexpr double kFar_m = 50;
   for (const RobotWheel& w : robot.wheels) {
     const std::string wheel = " of wheel \"" + w.name + "\"";
-    if (Status s = within("the radius" + wheel, w.radius_m.value_or(0), 1e-4, 10, "m"); !s)
-      return s;
-    if (Status s = within("x" + wheel, w.x_m.value_or(0), -kFar_m, kFar_m, "m"); !s) return s;
-    if (Status s = within("y" + wheel, w.y_m.value_or(0), -kFar_m, kFar_m, "m"); !s) return s;
+    RETURN_IF_ERROR(within("the radius" + wheel, w.radius_m.value_or(0), 1e-4, 10, "m"));
+    RETURN_IF_ERROR(within("x" + wheel, w.x_m.value_or(0), -kFar_m, kFar_m, "m"));
+    RETURN_IF_ERROR(within("y" + wheel, w.y_m.value_or(0), -kFar_m, kFar_m, "m"));
     const double length_m = w.contact_length_m.value_or(0);
-    if (Status s = within("the contact length" + wheel, length_m, 0, kFar_m, "m"); !s) return s;
+    RETURN_IF_ERROR(within("the contact length" + wheel, length_m, 0, kFar_m, "m"));
   }
   const ControllerKinematics& k = robot.controller;
   constexpr std::pair<const char*, std::optional<double> ControllerKinematics::*> kSizes[] = {
@@ -64,10 +63,10 @@ Status check_sizes(const GroundRobot& robot) {
       {"traction_track_width", &ControllerKinematics::traction_track_width_m}};
   for (const auto& [what, size] : kSizes) {
     if (!(k.*size)) continue;
-    if (Status s = within(what, *(k.*size), 1e-3, kFar_m, "m"); !s) return s;
+    RETURN_IF_ERROR(within(what, *(k.*size), 1e-3, kFar_m, "m"));
   }
   const double inertia = robot.yaw_inertia_kg_m2.value_or(0);
-  if (Status s = within("yaw_inertia", inertia, 1e-8, 1e8, "kg m^2"); !s) return s;
+  RETURN_IF_ERROR(within("yaw_inertia", inertia, 1e-8, 1e8, "kg m^2"));
   return within("the height of the centre of mass", robot.com_z_m.value_or(0), 1e-4, kFar_m, "m");
 }
 
@@ -160,12 +159,12 @@ Status check_robot(const GroundRobot& robot) {
     if (std::isfinite(value) && value > 0) return {};
     return Error{what + " is " + number(value) + ", expected more than 0"};
   };
-  if (Status s = check_sizes(robot); !s) return s;
+  RETURN_IF_ERROR(check_sizes(robot));
   if (!robot.com_x_m || !robot.com_y_m) return Error{"the centre of mass needs x and y in m"};
-  if (Status s = positive("mass", robot.mass_kg.value_or(0)); !s) return s;
-  if (Status s = positive("friction", robot.friction); !s) return s;
-  if (Status s = positive("friction_ratio", robot.friction_ratio); !s) return s;
-  if (Status s = check_channels(robot); !s) return s;
+  RETURN_IF_ERROR(positive("mass", robot.mass_kg.value_or(0)));
+  RETURN_IF_ERROR(positive("friction", robot.friction));
+  RETURN_IF_ERROR(positive("friction_ratio", robot.friction_ratio));
+  RETURN_IF_ERROR(check_channels(robot));
   if (!(robot.motors.lag_s >= 0)) return Error{"lag is below 0 s"};
   return {};
 }

@@ -255,15 +255,14 @@ void write_wheel(const RobotWheel& wheel, Lines& out) {
 }  // namespace
 
 Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) {
-  auto parsed = parse_toml(text, path);
-  if (!parsed.ok()) return parsed.error();
+  ASSIGN_OR_RETURN(auto parsed, parse_toml(text, path));
   TomlErrors errors(path);
-  TomlSection top(*parsed, "", errors);
+  TomlSection top(parsed, "", errors);
   GroundRobot robot;
   top.read("name", robot.name);
   if (const auto drive = top.choice("drive", drive_names())) {
     robot.drive = static_cast<DriveKind>(*drive);
-  } else if (!parsed->contains("drive")) {
+  } else if (!parsed.contains("drive")) {
     std::string known = joined(drive_names());
     return Error{path + ": no key 'drive', expected one of " + known};
   }
@@ -278,9 +277,8 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
 }
 
 Result<GroundRobot> read_robot(const std::string& path) {
-  auto text = read_text_file(path);
-  if (!text.ok()) return text.error();
-  return parse_robot(*text, path);
+  ASSIGN_OR_RETURN(auto text, read_text_file(path));
+  return parse_robot(text, path);
 }
 
 std::string format_robot(const GroundRobot& robot) {

@@ -231,14 +231,13 @@ Result<std::vector<BaselineScores>> crossfitted_baselines(const TrialLog& log,
       if (fold_of[i] == f) places.push_back(i);
     }
     if (test.trials.empty() || train.trials.empty()) continue;
-    const auto scores = baseline_scores(train, test, commands);
-    if (!scores) return scores.error();
-    all.resize(scores->size());
+    ASSIGN_OR_RETURN(const auto scores, baseline_scores(train, test, commands));
+    all.resize(scores.size());
     for (std::size_t b = 0; b < all.size(); ++b) {
-      all[b].name = (*scores)[b].name;
+      all[b].name = scores[b].name;
       all[b].scores.resize(log.trials.size());
       for (std::size_t i = 0; i < places.size(); ++i) {
-        all[b].scores[places[i]] = (*scores)[b].scores[i];
+        all[b].scores[places[i]] = scores[b].scores[i];
       }
     }
   }

@@ -37,10 +37,9 @@ Pose ConstantVelocity::at(double t_s) const {
 
 Result<std::vector<ConstantVelocity>> constant_velocities(const TrialLog& log,
                                                           std::span<const CommandSpec> commands) {
-  const auto mined = MotionModel::mine(log, commands);
-  if (!mined) return mined.error();
+  ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, commands));
   std::vector<ConstantVelocity> models;
-  for (const CommandMotion& motion : mined->commands()) {
+  for (const CommandMotion& motion : mined.commands()) {
     if (!(motion.command.duration_s > 0)) {
       return Error{"command '" + motion.command.name +
                    "' lasts 0 s, so it has no velocity; give its duration"};
@@ -60,20 +59,18 @@ Result<std::vector<ConstantVelocity>> constant_velocities(const TrialLog& log,
 }
 
 Result<double> constant_velocity_fitness(const Problem& problem) {
-  const auto models = constant_velocities(problem.log, problem.commands);
-  if (!models) return models.error();
+  ASSIGN_OR_RETURN(const auto models, constant_velocities(problem.log, problem.commands));
   if (problem.fitness.kind == FitnessKind::kRobustMahalanobis) {
     const auto mined = MotionModel::mine(problem.log, problem.commands);
     double sum = 0;
     std::size_t count = 0;
-    for (std::size_t i = 0; i < models->size(); ++i) {
+    for (std::size_t i = 0; i < models.size(); ++i) {
       const CommandMotion& real = mined->commands()[i];
       if (real.trials < MotionModelSettings{}.least_trials) continue;
-      const auto distance =
-          robust_distance((*models)[i].at(real.command.duration_s),
-                          {real.command.name, real.motion.mean, real.motion.covariance});
-      if (!distance) return distance.error();
-      sum += *distance;
+      ASSIGN_OR_RETURN(const auto distance, robust_distance(models[i].at(real.command.duration_s),
+                                                            {real.command.name, real.motion.mean,
+                                                             real.motion.covariance}));
+      sum += distance;
       ++count;
     }
     if (count == 0) return Error{"no command has trials enough for robust_mahalanobis"};
@@ -82,7 +79,7 @@ Result<double> constant_velocity_fitness(const Problem& problem) {
   std::vector<ScoredTrial> scored;
   for (const Trial& trial : problem.log.trials) {
     const CommandSpec command = resolved_command(trial, problem.commands);
-    const auto model = std::ranges::find(*models, command, &ConstantVelocity::command);
+    const auto model = std::ranges::find(models, command, &ConstantVelocity::command);
     const Pose X_WP = trial.X_WS * model->at(command.duration_s);
     scored.push_back({local_difference(X_WP, trial.X_WE), model->covariance});
   }

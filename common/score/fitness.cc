@@ -86,9 +86,8 @@ Result<RobustFitness> robust_fitness(std::span<const RealMotion> real,
   }
   RobustFitness result;
   for (std::size_t i = 0; i < real.size(); ++i) {
-    const Result<double> distance = robust_distance(simulated[i].X_SE, real[i]);
-    if (!distance) return distance.error();
-    result.distance += *distance;
+    ASSIGN_OR_RETURN(const auto distance, robust_distance(simulated[i].X_SE, real[i]));
+    result.distance += distance;
     result.penalty += motion_penalty(simulated[i].facts, settings);
   }
   result.distance /= static_cast<double>(real.size());

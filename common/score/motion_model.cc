@@ -81,17 +81,15 @@ Result<const CommandMotion*> MotionModel::find(const CommandSpec& command) const
 }
 
 Result<PosePrediction> MotionModel::predict(const Pose& X_WS, const CommandSpec& command) const {
-  const Result<const CommandMotion*> found = find(command);
-  if (!found) return found.error();
-  const RobustPose& motion = (*found)->motion;
+  ASSIGN_OR_RETURN(const auto* found, find(command));
+  const RobustPose& motion = found->motion;
   return PosePrediction{X_WS * motion.mean, rotate_covariance(motion.covariance, X_WS.theta)};
 }
 
 Result<double> MotionModel::log_density(const Pose& X_WS, const CommandSpec& command,
                                         const Pose& X_WE, double outlier_share) const {
-  const Result<const CommandMotion*> found = find(command);
-  if (!found) return found.error();
-  const RobustPose& motion = (*found)->motion;
+  ASSIGN_OR_RETURN(const auto* found, find(command));
+  const RobustPose& motion = found->motion;
   const Result<Covariance3> covariance = Covariance3::factorise(motion.covariance);
   if (!covariance) return Error{describe(command) + ": " + covariance.error().message};
   const Pose end = between(X_WS, X_WE);

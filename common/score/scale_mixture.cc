@@ -166,9 +166,9 @@ Result<double> expected_log_density(const TailedDensity& density, const NoiseTai
     ASSIGN_OR_RETURN(const auto factor, Covariance3::factorise(drawn));
     Eigen::Vector3d z;
     for (double& value : z) value = stream.normal();
-    const auto score = density.log_density(factor.lower() * z, covariance, reading, outlier_share);
-    if (!score) return score.error();
-    sum += *score;
+    ASSIGN_OR_RETURN(const auto score,
+                     density.log_density(factor.lower() * z, covariance, reading, outlier_share));
+    sum += score;
   }
   return sum / draws;
 }

@@ -214,7 +214,7 @@ Status join(std::vector<Part> parts, TrialLog& log) {
 
 // What one text holds, for the readers of texts.
 Result<TrialLog> finished(TrialLog log, const Mistakes& mistakes) {
-  if (Status status = mistakes.status(); !status.ok()) return status.error();
+  RETURN_IF_ERROR(mistakes.status());
   for (std::string& note : mistakes.notes()) log.notes.push_back(std::move(note));
   return log;
 }
@@ -262,9 +262,9 @@ Result<TrialLog> read_trial_files(std::span<const std::string> paths,
   for (const std::string& file : options.paths) {
     add_file(file, all, add_paths, log.files, mistakes);
   }
-  if (Status status = mistakes.status(); !status.ok()) return status.error();
+  RETURN_IF_ERROR(mistakes.status());
   if (options.name_sessions) std::for_each(parts.begin(), parts.end(), name_sessions);
-  if (Status status = join(std::move(parts), log); !status.ok()) return status.error();
+  RETURN_IF_ERROR(join(std::move(parts), log));
   return finished(std::move(log), mistakes);
 }
 

@@ -123,9 +123,8 @@ Result<WaypointLog> parse_waypoint_log(std::string_view text, const std::string&
 }
 
 Result<WaypointLog> read_waypoint_log(const std::string& file) {
-  const auto text = read_text_file(file);
-  if (!text) return text.error();
-  return parse_waypoint_log(*text, file);
+  ASSIGN_OR_RETURN(const auto text, read_text_file(file));
+  return parse_waypoint_log(text, file);
 }
 
 }  // namespace gapfarm

@@ -142,9 +142,8 @@ Result<std::vector<TrialFile>> trial_files(const TrialLog& log, const std::strin
 }
 
 Status write_trials(const TrialLog& log, const std::string& path) {
-  const auto files = trial_files(log, path);
-  if (!files.ok()) return files.error();
-  for (const TrialFile& file : *files) {
+  ASSIGN_OR_RETURN(const auto files, trial_files(log, path));
+  for (const TrialFile& file : files) {
     if (Status written = write_file_atomically(file.path, file.text); !written.ok()) return written;
   }
   return {};

@@ -36,33 +36,30 @@ LogLevel level_of(FarmEvent::Kind kind) {
 }  // namespace
 
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials) {
-  Result<Config> config = read_config(config_path);
-  if (!config) return config.error();
+  ASSIGN_OR_RETURN(Config config, read_config(config_path));
   if (trials.needed) {
-    RETURN_IF_ERROR(check_moves(config->problem.scenario, config_path));
+    RETURN_IF_ERROR(check_moves(config.problem.scenario, config_path));
   }
-  if (scenario_form(config->problem.scenario).objective) {
+  if (scenario_form(config.problem.scenario).objective) {
     if (trials.files.empty()) return config;
     return Error{config_path + ": scenario objective has no trials; omit --trials"};
   }
-  if (!trials.files.empty()) config->trial_files = trials.files;
-  if (config->trial_files.empty()) {
-    const bool runs = config->problem.windows();
+  if (!trials.files.empty()) config.trial_files = trials.files;
+  if (config.trial_files.empty()) {
+    const bool runs = config.problem.windows();
     return Error{
         config_path +
         (runs ? ": names no runs; add [runs] with folders = [\"FOLDER\"] or give --trials FOLDER"
               : ": names no trial files; add them to the config or give --trials FILE")};
   }
-  if (config->problem.windows()) {
-    const Status read = read_problem_runs(config->trial_files, config->windows, &config->problem);
-    if (!read) return read.error();
+  if (config.problem.windows()) {
+    RETURN_IF_ERROR(read_problem_runs(config.trial_files, config.windows, &config.problem));
     return config;
   }
   ASSIGN_OR_RETURN(
-      TrialLog log,
-      read_trial_files(config->trial_files, command_names(config->problem.commands), trials.read));
-  config->problem.log = std::move(log);
-  const v1::Problem message = to_proto(config->problem);
+      config.problem.log,
+      read_trial_files(config.trial_files, command_names(config.problem.commands), trials.read));
+  const v1::Problem message = to_proto(config.problem);
   ASSIGN_OR_RETURN(const Problem sound, from_proto(message));
   RETURN_IF_ERROR(check_sendable(message));
   return config;
@@ -152,8 +149,7 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   context.begun = true;
   base.local_workers = local_workers(options, settings);
   base.listen = endpoints_of(options, settings);
-  ASSIGN_OR_RETURN(LinkSecurity security, link_security(options, base.listen));
-  base.security = std::move(security);
+  ASSIGN_OR_RETURN(base.security, link_security(options, base.listen));
   if (base.security.open != OpenLinks::kNever) {
     context.console.note(
         "insecure: links are neither encrypted nor authenticated; whoever reaches this machine's "
@@ -266,8 +262,7 @@ Result<Model> find_model(const std::string& run_or_model, Console& console) {
   const fs::path file = path / "model.toml";
   std::optional<Model> left;
   if (fs::exists(file, ignored)) {
-    ASSIGN_OR_RETURN(auto model, read_model(file.string()));
-    left = std::move(model);
+    ASSIGN_OR_RETURN(left, read_model(file.string()));
   }
   if (!fs::exists(run_store_file(path), ignored)) {
     if (left) return *std::move(left);

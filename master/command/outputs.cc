@@ -224,22 +224,20 @@ void TracedCommands::declare(CLI::App& app) {
 }
 
 Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) const {
-  Result<Config> config = read_config(path);
-  if (!config) return config.error();
-  RETURN_IF_ERROR(check_moves(config->problem.scenario, path));
-  to->seed = config->seed;
+  ASSIGN_OR_RETURN(Config config, read_config(path));
+  RETURN_IF_ERROR(check_moves(config.problem.scenario, path));
+  to->seed = config.seed;
   to->interval_s = interval_s;
-  RETURN_IF_ERROR(choose(config->problem.commands, to));
-  if (config->problem.pieces.empty()) {
+  RETURN_IF_ERROR(choose(config.problem.commands, to));
+  if (config.problem.pieces.empty()) {
     if (trials.files.empty() && only.empty()) return config;
-    return Error{path + ": scenario " + config->problem.scenario +
+    return Error{path + ": scenario " + config.problem.scenario +
                  " traces commands and no trials; omit --trials and --only"};
   }
-  config = read_config_and_trials(path, trials);
-  if (!config) return config.error();
-  ASSIGN_OR_RETURN(TrialLog log, select_trials(config->problem.log, only));
-  config->problem.log = std::move(log);
-  const std::vector<Trial>& pushes = config->problem.log.trials;
+  ASSIGN_OR_RETURN(config, read_config_and_trials(path, trials));
+  ASSIGN_OR_RETURN(TrialLog log, select_trials(config.problem.log, only));
+  config.problem.log = std::move(log);
+  const std::vector<Trial>& pushes = config.problem.log.trials;
   for (std::uint32_t i = 0; i < pushes.size(); ++i) {
     const auto wanted = [&](const CommandSpec& c) { return c.name == pushes[i].command; };
     if (std::ranges::any_of(to->commands, wanted)) to->trials.push_back(i);

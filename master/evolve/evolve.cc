@@ -317,7 +317,7 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, G
 
     GenerationRecord record = record_generation(optimiser);
     record.wall_s = clock.now_s() - generation_began_s;
-    if (const Status committed = sink.commit(record); !committed) return committed.error();
+    RETURN_IF_ERROR(sink.commit(record));
   }
 }
 

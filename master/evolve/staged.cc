@@ -13,8 +13,7 @@ class StagedOptimiser final : public Optimiser {
       : setup_(setup), stages_(std::move(stages)) {}
 
   Status begin() {
-    ASSIGN_OR_RETURN(auto made, make_optimiser(stage_setup()));
-    inner_ = std::move(made);
+    ASSIGN_OR_RETURN(inner_, make_optimiser(stage_setup()));
     return {};
   }
 

@@ -69,8 +69,7 @@ Status SocketFarm::open() {
   SocketOptions links;
   links.security = options_.security;
   links.limits = options_.limits;
-  ASSIGN_OR_RETURN(auto made, RouterSocket::create(links));
-  socket_ = std::move(made);
+  ASSIGN_OR_RETURN(socket_, RouterSocket::create(links));
   for (const std::string& endpoint : options_.listen) {
     ASSIGN_OR_RETURN(auto bound, socket_->bind(endpoint));
     endpoints_.push_back(bound);
@@ -82,8 +81,7 @@ Status SocketFarm::open_local() {
   ASSIGN_OR_RETURN(auto program, options_.worker_program.empty()
                                      ? find_worker_program()
                                      : Result<std::string>(options_.worker_program));
-  ASSIGN_OR_RETURN(auto made, PrivateFolder::make());
-  folder_ = std::move(made);
+  ASSIGN_OR_RETURN(folder_, PrivateFolder::make());
   ASSIGN_OR_RETURN(auto endpoint, socket_->bind("ipc://" + folder_->socket_path()));
   locals_ = std::make_unique<LocalWorkers>(program, options_.local_workers, endpoint,
                                            options_.local_limits);

@@ -52,12 +52,11 @@ Result<std::string> baseline_note(const Model& model, const TrialLog& log,
   if (!has_baselines(model.scenario) || log.trials.empty()) return std::string();
   const auto behind = trials_behind(model);
   if (behind && !same_trials(*behind, log)) {
-    const auto baselines = baseline_scores(*behind, log, model.commands);
-    if (!baselines) return baselines.error();
+    ASSIGN_OR_RETURN(const auto baselines, baseline_scores(*behind, log, model.commands));
     return note(baselines, scores, "learned from the model's trials");
   }
-  const auto baselines = crossfitted_baselines(log, model.commands, session_folds(log));
-  if (!baselines) return baselines.error();
+  ASSIGN_OR_RETURN(const auto baselines,
+                   crossfitted_baselines(log, model.commands, session_folds(log)));
   return note(baselines, scores,
               behind ? kFromOthers : "learned from the other sessions of this log");
 }

@@ -195,13 +195,11 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
   }
   Problem apart = config.problem;
   if (apart.windows()) {
-    const Status read = read_problem_runs(plan.validation_files, config.windows, &apart);
-    if (!read) return read.error();
+    RETURN_IF_ERROR(read_problem_runs(plan.validation_files, config.windows, &apart));
     return std::optional<Problem>(std::move(apart));
   }
-  ASSIGN_OR_RETURN(auto log,
+  ASSIGN_OR_RETURN(apart.log,
                    read_trial_files(plan.validation_files, command_names(config.problem.commands)));
-  apart.log = std::move(log);
   return std::optional<Problem>(std::move(apart));
 }
 

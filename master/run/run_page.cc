@@ -304,8 +304,7 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
   }
   report.objective = is_value(problem.fitness.kind);
   if (!report.objective) {
-    ASSIGN_OR_RETURN(auto outcome, stored_outcome(reader, last, &report));
-    report.outcome = std::move(outcome);
+    ASSIGN_OR_RETURN(report.outcome, stored_outcome(reader, last, &report));
   }
   RETURN_IF_ERROR(add_history(reader, problem, generations, question, &report));
   const auto apart = held_out_of(info, problem);

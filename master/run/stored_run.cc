@@ -130,17 +130,16 @@ Result<Config> parse_stored(const RunInfo& info, const Problem& problem) {
 
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
   ASSIGN_OR_RETURN(Problem problem, stored_problem(info));
-  Result<Config> config = parse_stored(info, problem);
-  if (!config) return config.error();
-  config->problem = std::move(problem);
-  config->seed = info.seed;
+  ASSIGN_OR_RETURN(auto config, parse_stored(info, problem));
+  config.problem = std::move(problem);
+  config.seed = info.seed;
   if (default_optimiser(info.config_text) && !parse_json(info.overrides).contains(kDefaultKind)) {
-    config->evolution.optimiser.kind = OptimiserKind::kGenetic;
+    config.evolution.optimiser.kind = OptimiserKind::kGenetic;
   }
   EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
   all.merge(overrides);
-  all.apply(config->evolution);
-  config->evolution.start = stored_start(info, config->problem.genes.size());
+  all.apply(config.evolution);
+  config.evolution.start = stored_start(info, config.problem.genes.size());
   return config;
 }
 

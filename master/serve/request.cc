@@ -75,8 +75,7 @@ Result<Target> parse_target(std::string_view target) {
   target = target.substr(0, target.find('#'));
   const std::size_t mark = std::min(target.find('?'), target.size());
   Target parsed;
-  ASSIGN_OR_RETURN(auto path, decoded(target.substr(0, mark), false));
-  parsed.path = std::move(path);
+  ASSIGN_OR_RETURN(parsed.path, decoded(target.substr(0, mark), false));
   if (mark < target.size()) {
     RETURN_IF_ERROR(read_query(target.substr(mark + 1), &parsed));
   }

@@ -194,8 +194,7 @@ Result<std::vector<v1::TaskResult>> RecordedFarm::run(
     unkept_.erase(fresh);
   }
   std::vector<v1::TaskResult> results(tasks.size());
-  ASSIGN_OR_RETURN(auto open, look_up(problem_hash, tasks, results));
-  open_ = std::move(open);
+  ASSIGN_OR_RETURN(open_, look_up(problem_hash, tasks, results));
   problem_hash_ = problem_hash;
   waiting_.clear();
   trouble_ = {};

@@ -241,8 +241,7 @@ Result<Progress> RunReader::progress() const {
 Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
   RunStatus status;
   status.info = reader.info();
-  ASSIGN_OR_RETURN(Progress progress, reader.progress());
-  status.progress = std::move(progress);
+  ASSIGN_OR_RETURN(status.progress, reader.progress());
   status.heartbeat_age_s = now_unix_s - status.progress.heartbeat_unix_s;
 
   ASSIGN_OR_RETURN(const std::vector<StoredGeneration> generations, reader.generations());
@@ -251,8 +250,7 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.wall_s += generation.wall_s;
     status.quarantined += generation.quarantined;
   }
-  ASSIGN_OR_RETURN(std::vector<Incident> incidents, reader.incidents());
-  status.incidents = std::move(incidents);
+  ASSIGN_OR_RETURN(status.incidents, reader.incidents());
   if (!generations.empty()) {
     const StoredGeneration& last = generations.back();
     status.generation = last.generation;
@@ -270,8 +268,7 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
   ASSIGN_OR_RETURN(std::vector<StoredIndividual> members, reader.individuals(status.generation));
   status.best_individual = best_of(std::move(members));
 
-  ASSIGN_OR_RETURN(RunFront front, run_front(reader, generations));
-  status.front = std::move(front);
+  ASSIGN_OR_RETURN(status.front, run_front(reader, generations));
 
   status.state = status.progress.state;
   status.stop_reason = status.progress.stop_reason;

@@ -33,8 +33,7 @@ class Cutter {
     std::vector<CsvRow> rows;
     while (at_ < text_.size()) {
       CsvRow row;
-      Status status = cut_row(row);
-      if (!status.ok()) return status.error();
+      RETURN_IF_ERROR(cut_row(row));
       const bool empty = row.fields.size() == 1 && row.fields[0].text.empty();
       if (!empty) rows.push_back(std::move(row));
     }
@@ -71,8 +70,7 @@ class Cutter {
       CsvField field;
       field.place = place();
       if (at_ < text_.size() && text_[at_] == '"') {
-        Status status = cut_quoted(field);
-        if (!status.ok()) return status;
+        RETURN_IF_ERROR(cut_quoted(field));
       } else {
         const std::size_t begin = at_;
         while (!at_line_end() && text_[at_] != separator_) ++at_;
@@ -204,8 +202,7 @@ bool is_comment(std::string_view line) {
 
 Result<std::vector<CsvRow>> parse_separated(std::string_view text, std::string_view file,
                                             char separator) {
-  Status encoding = check_utf8(text, file);
-  if (!encoding.ok()) return encoding.error();
+  RETURN_IF_ERROR(check_utf8(text, file));
   return Cutter(text, file, separator).cut();
 }
 

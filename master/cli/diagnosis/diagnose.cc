@@ -180,8 +180,7 @@ Status plan_outputs(DiagnoseCommand& command, const Config& config, const Proven
   }
   for (const char* name : names) {
     const std::string path = (std::filesystem::path(command.out) / name).string();
-    const Status s = state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
-    if (!s) return s;
+    RETURN_IF_ERROR(state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path));
   }
   return {};
 }

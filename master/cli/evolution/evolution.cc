@@ -176,8 +176,7 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   std::unique_ptr<PageAlong> page;
   std::unique_ptr<WorkersBeside> beside;
   const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<Farm>> {
-    ASSIGN_OR_RETURN(auto opened, open_page(options.page, store.run(), context));
-    page = std::move(opened);
+    ASSIGN_OR_RETURN(page, open_page(options.page, store.run(), context));
     auto made = open_farm(store, config, options, log, keep, context);
     if (!made || options.fleet.system.empty()) return made;
     ASSIGN_OR_RETURN(beside, start_beside(options, (*made)->endpoints()));

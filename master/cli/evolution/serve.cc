@@ -237,8 +237,7 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
   if (!farm_) {
     FarmOptions local;
     local.workers = 1;
-    ASSIGN_OR_RETURN(auto farm, start_farm(local, {}, context_));
-    farm_ = std::move(farm);
+    ASSIGN_OR_RETURN(farm_, start_farm(local, {}, context_));
   }
   const Problem& of = beyond ? **apart : problem;
   const Trial& trial = of.log.trials[beyond ? question.trial - logged : question.trial];

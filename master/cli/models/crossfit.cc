@@ -124,8 +124,7 @@ Status apply(const CrossfitOptions& options, Config& config) {
   if (!options.genes.empty()) {
     RETURN_IF_ERROR(apply_genes(options.genes, config.problem));
   }
-  ASSIGN_OR_RETURN(TrialLog log, select_trials(config.problem.log, options.only));
-  config.problem.log = std::move(log);
+  ASSIGN_OR_RETURN(config.problem.log, select_trials(config.problem.log, options.only));
   return check_evolvable(config);
 }
 

@@ -155,8 +155,7 @@ class Driving {
                        read_trial_files(command_.mined, command_names(problem_.commands),
                                         command_.reading.read));
       show_notes(log, console_);
-      ASSIGN_OR_RETURN(const auto fitted, constant_velocities(log, problem_.commands));
-      constant = fitted;
+      ASSIGN_OR_RETURN(constant, constant_velocities(log, problem_.commands));
       ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, problem_.commands));
       const auto mover = mined_mover(mined, command_.settings);
       RETURN_IF_ERROR(add("mined motion model", drive(*mover, constant, command_.runs), true));

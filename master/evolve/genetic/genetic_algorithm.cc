@@ -300,7 +300,7 @@ std::vector<Individual> GeneticAlgorithm::members() const {
 }  // namespace
 
 Result<std::unique_ptr<Optimiser>> make_genetic(const OptimiserSetup& setup) {
-  if (const Status status = check(setup); !status) return status.error();
+  RETURN_IF_ERROR(check(setup));
   return std::unique_ptr<Optimiser>(std::make_unique<GeneticAlgorithm>(setup));
 }
 

@@ -267,8 +267,7 @@ Result<BlindReport> run_foreign_check(const std::string& cases, const std::strin
     const bool has_truth = !truths.empty() && fs::exists(file);
     if (has_truth) {
       ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
-      ASSIGN_OR_RETURN(Truth parsed, parse_truth(text, file, c.id));
-      truth = std::move(parsed);
+      ASSIGN_OR_RETURN(truth, parse_truth(text, file, c.id));
     }
     report.cases.push_back(scored(truth, paths));
     report.cases.back().has_truth = has_truth;

@@ -139,8 +139,7 @@ class Crossfit {
     std::vector<std::string> parts = {""};
     TrialColumnReader per;
     if (!plan_.per.empty()) {
-      ASSIGN_OR_RETURN(const auto reader, trial_column_reader(log, plan_.per));
-      per = reader;
+      ASSIGN_OR_RETURN(per, trial_column_reader(log, plan_.per));
       const auto values = values_in(log, per);
       if (values.size() > 1) parts.insert(parts.end(), values.begin(), values.end());
     }

@@ -31,8 +31,8 @@ class Db3Bag {
     const int code = sqlite3_open_v2(path_.c_str(), &raw, SQLITE_OPEN_READONLY, nullptr);
     database_.reset(raw);
     if (code != SQLITE_OK) return broken();
-    if (Status s = read_topics(); !s) return s.error();
-    if (Status s = read_messages(); !s) return s.error();
+    RETURN_IF_ERROR(read_topics());
+    RETURN_IF_ERROR(read_messages());
     return topics_.finish();
   }
 

@@ -73,7 +73,7 @@ class McapReader {
                        kRecover);
         }
         if (!source_.read(at + 9, length, bytes)) return cut(at);
-        if (Status s = record(at, op, bytes); !s) return s.error();
+        RETURN_IF_ERROR(record(at, op, bytes));
       }
       ended_ = op == kFooter;
       at += 9 + length;
@@ -135,7 +135,7 @@ class McapReader {
       const auto op = inner.number<unsigned char>();
       const std::string_view bytes = inner.take(inner.number<std::uint64_t>());
       if (!inner.good()) return broken(at);
-      if (Status s = record(at, op, bytes); !s) return s;
+      RETURN_IF_ERROR(record(at, op, bytes));
     }
     nested_ = false;
     return {};

@@ -172,7 +172,7 @@ Status MessageSchema::check(const std::string& type, int depth) const {
   if (depth > kDeepest) return Error{"type " + quoted_word(type_) + " holds itself"};
   for (const Field& field : found->second) {
     if (field.primitive >= 0) continue;
-    if (Status s = check(field.type, depth + 1); !s) return s;
+    RETURN_IF_ERROR(check(field.type, depth + 1));
   }
   return {};
 }
@@ -228,7 +228,7 @@ Result<MessageSchema> MessageSchema::parse(const std::string& type, std::string_
       field.type = name;
     }
   }
-  if (Status s = schema.check(schema.type_, 0); !s) return s.error();
+  RETURN_IF_ERROR(schema.check(schema.type_, 0));
   return schema;
 }
 

@@ -53,7 +53,7 @@ class BagReader {
     }
     at_ = kBagMagic.size();
     while (at_ < source_.size()) {
-      if (Status s = record(); !s) return s.error();
+      RETURN_IF_ERROR(record());
     }
     return topics_.finish();
   }
@@ -113,7 +113,7 @@ class BagReader {
       if (!split(rest, inner, data)) {
         return error(begin, "a chunk whose records do not fill it", "whole records", kReindex);
       }
-      if (Status s = entry(begin, number<unsigned char>(inner["op"]), inner, data); !s) return s;
+      RETURN_IF_ERROR(entry(begin, number<unsigned char>(inner["op"]), inner, data));
     }
     return {};
   }

@@ -299,7 +299,7 @@ Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file
   LogTable table{file, "", "csv", names, {}};
   for (const CsvField& field : head.titles) table.titles.push_back(field.text);
   table.units = head.units;
-  if (Status s = check_decimals(rows, head.rows, separator, file); !s) return s.error();
+  RETURN_IF_ERROR(check_decimals(rows, head.rows, separator, file));
   blank_other_widths(head.rows, names.size(),
                      " as in the header, separated by " +
                          (separator == '\t' ? "tabs" : quoted_word({&separator, 1})),

@@ -98,7 +98,7 @@ Status Topics::add(const BagTopic& of, double t_s, std::string_view bytes) {
   }
   for (const auto& [at, numbers] : frames) {
     const std::string table = topic + ":" + text_in(*content, at + "child_frame_id");
-    if (Status s = put(table, type, t_s, numbers, *content, at); !s) return s;
+    RETURN_IF_ERROR(put(table, type, t_s, numbers, *content, at));
   }
   return {};
 }

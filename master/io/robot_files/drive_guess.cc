@@ -43,8 +43,8 @@ class Guess {
   }
 
   Result<DriveGuess> run() {
-    if (Status s = turn_forward(); !s) return s.error();
-    if (Status s = set_drive(); !s) return s.error();
+    RETURN_IF_ERROR(turn_forward());
+    RETURN_IF_ERROR(set_drive());
     return std::move(guess_);
   }
 

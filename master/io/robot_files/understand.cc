@@ -39,9 +39,7 @@ class Understanding {
   }
 
   Result<RobotReading> run() {
-    Result<Chassis> chassis = find_chassis(model_, facts_);
-    if (!chassis) return chassis.error();
-    chassis_ = *std::move(chassis);
+    ASSIGN_OR_RETURN(chassis_, find_chassis(model_, facts_));
     for (const UrdfNote& note : model_.notes) {
       reading_.remarks.push_back("line " + std::to_string(note.line) + ": " + note.text);
     }

@@ -154,7 +154,7 @@ Result<UrdfModel> parse_urdf(std::string_view text, const std::string& file) {
   if (model->links.empty()) {
     return Error{at_line(file, 1) + "found no <link>, expected a robot's links and joints"};
   }
-  if (Status status = check_tree(*model); !status) return status.error();
+  RETURN_IF_ERROR(check_tree(*model));
   if (link_poses(*model).size() != model->links.size()) {
     return Error{
         at_line(file, 1) +

@@ -263,7 +263,7 @@ Result<UrdfModel> Reader::read(std::string_view text) {
                  "), expected a URDF; check that line and the one before"};
   }
   const XMLElement* root = document.RootElement();
-  if (Status status = check_root(root); !status) return status.error();
+  RETURN_IF_ERROR(check_root(root));
   read_names(*root);
   std::set<std::string> declared = {"xml", "xacro"};
   read_prefixes(*root, declared, 0);
