@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 #include <iterator>
+#include <numeric>
 #include <type_traits>
 #include <vector>
 
@@ -27,6 +28,22 @@ template <class Range, class Value, class Of>
 auto find_by(Range& range, const Value& value, Of of) -> decltype(&*std::begin(range)) {
   const auto found = std::ranges::find(range, value, of);
   return found == std::ranges::end(range) ? nullptr : &*found;
+}
+
+// 0 to count - 1.
+inline std::vector<std::size_t> indices(std::size_t count) {
+  std::vector<std::size_t> all(count);
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
+
+// The indices of `items` in ascending order, equal ones as they stand.
+template <class Items, class Less = std::ranges::less>
+std::vector<std::size_t> order_of(const Items& items, Less less = {}) {
+  std::vector<std::size_t> order = indices(items.size());
+  std::ranges::stable_sort(order,
+                           [&](std::size_t a, std::size_t b) { return less(items[a], items[b]); });
+  return order;
 }
 
 }  // namespace gapfarm

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
-#include <numeric>
+
+#include "common/base/ranges.h"
 
 namespace gapfarm {
 namespace {
@@ -98,11 +99,9 @@ std::vector<std::size_t> first_front(std::span<const Costs> points) {
 std::vector<double> crowding_distances(std::span<const Costs> front) {
   std::vector<double> distances(front.size());
   if (front.empty()) return distances;
-  std::vector<std::size_t> order(front.size());
   for (std::size_t m = 0; m < front.front().size(); ++m) {
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return front[a][m] < front[b][m]; });
+    const std::vector<std::size_t> order =
+        order_of(front, [&](const Costs& a, const Costs& b) { return a[m] < b[m]; });
     const double range = front[order.back()][m] - front[order.front()][m];
     distances[order.front()] = distances[order.back()] = std::numeric_limits<double>::infinity();
     if (!(range > 0)) continue;

@@ -6,7 +6,6 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "common/base/ranges.h"
 #include "common/math/laws.h"
@@ -81,8 +80,7 @@ class Concentration {
   // C-step: the `support` points nearest to the fit.  Never increases the determinant.
   Fit step(const Fit& from) const {
     const Eigen::VectorXd d = distances(from);
-    std::vector<std::size_t> order(static_cast<std::size_t>(points_.cols()));
-    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::vector<std::size_t> order = indices(static_cast<std::size_t>(points_.cols()));
     const auto closer = [&d](std::size_t a, std::size_t b) {
       const double da = d[static_cast<Index>(a)], db = d[static_cast<Index>(b)];
       return da != db ? da < db : a < b;
@@ -97,8 +95,7 @@ class Concentration {
   // A random (p + 1)-subset, enlarged point by point while its covariance is singular.
   Fit random_start(Stream& stream) const {
     const auto n = static_cast<std::size_t>(points_.cols());
-    std::vector<std::size_t> pool(n);
-    std::iota(pool.begin(), pool.end(), std::size_t{0});
+    std::vector<std::size_t> pool = indices(n);
     const auto draw = [&](std::size_t k) { std::swap(pool[k], pool[k + stream.below(n - k)]); };
     auto size = static_cast<std::size_t>(points_.rows()) + 1;
     for (std::size_t k = 0; k < size; ++k) draw(k);
@@ -164,9 +161,7 @@ Eigen::VectorXd ridge_variances(const Eigen::MatrixXd& points) {
 
 RobustEstimate plain_estimate(const Eigen::MatrixXd& points) {
   const auto n = static_cast<std::size_t>(points.cols());
-  std::vector<std::size_t> all(n);
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  Fit fit = Concentration(points, n, Eigen::VectorXd::Zero(points.rows())).fit(all);
+  Fit fit = Concentration(points, n, Eigen::VectorXd::Zero(points.rows())).fit(indices(n));
   const double unbias = n > 1 ? static_cast<double>(n) / static_cast<double>(n - 1) : 1;
   RobustEstimate result;
   result.outcome = McdOutcome::kTooFew;
@@ -175,7 +170,7 @@ RobustEstimate plain_estimate(const Eigen::MatrixXd& points) {
   result.mean = fit.mean;
   result.raw_covariance = result.covariance;
   result.raw_log_determinant = std::log(result.covariance.determinant());
-  result.support = std::move(all);
+  result.support = indices(n);
   result.weights.assign(n, 1.0);
   return result;
 }

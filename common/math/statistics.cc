@@ -3,19 +3,18 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numeric>
 
+#include "common/base/ranges.h"
 #include "common/pose/pose.h"
 
 namespace gapfarm {
 namespace {
 
-std::vector<std::size_t> ascending_order(std::span<const double> values) {
-  std::vector<std::size_t> order(values.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
-  return order;
+double squares_about_mean(std::span<const double> values) {
+  const double middle = mean(values);
+  double sum = 0;
+  for (const double v : values) sum += (v - middle) * (v - middle);
+  return sum;
 }
 
 }  // namespace
@@ -113,7 +112,7 @@ Interval bootstrap_interval(std::span<const std::vector<std::size_t>> blocks,
 
 std::vector<double> holm(std::span<const double> p_values) {
   std::vector<double> adjusted(p_values.size());
-  const std::vector<std::size_t> order = ascending_order(p_values);
+  const std::vector<std::size_t> order = order_of(p_values);
   double running = 0;
   for (std::size_t i = 0; i < order.size(); ++i) {
     const double scaled = static_cast<double>(order.size() - i) * p_values[order[i]];
@@ -121,6 +120,29 @@ std::vector<double> holm(std::span<const double> p_values) {
     adjusted[order[i]] = running;
   }
   return adjusted;
+}
+
+double first_order_index(std::span<const double> x, std::span<const double> y) {
+  assert(x.size() == y.size());
+  const std::size_t n = x.size();
+  if (n < kLeastForImportance) return 0;
+  const std::vector<std::size_t> order = order_of(x);
+  const std::vector<double> sorted = mapped(order, [&](std::size_t i) { return y[i]; });
+  const double whole = squares_about_mean(sorted);
+  if (!(whole > 0)) return 0;
+  // Rice's rule.
+  const auto wanted = 2 * std::cbrt(static_cast<double>(n));
+  const auto each = static_cast<std::size_t>(std::ceil(static_cast<double>(n) / wanted));
+  double within = 0;
+  std::size_t classes = 0;
+  for (std::size_t from = 0; from < n; ++classes) {
+    std::size_t to = std::min(n, from + each);
+    while (to < n && x[order[to]] == x[order[to - 1]]) ++to;
+    within += squares_about_mean(std::span(sorted).subspan(from, to - from));
+    from = to;
+  }
+  const auto free = static_cast<double>(n - classes), all = static_cast<double>(n - 1);
+  return std::clamp(1 - within / whole * all / free, 0.0, 1.0);
 }
 
 }  // namespace gapfarm

@@ -5,8 +5,9 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <utility>
+
+#include "common/base/ranges.h"
 
 namespace gapfarm {
 
@@ -56,8 +57,7 @@ std::uint64_t Stream::below(std::uint64_t n) {
 bool Stream::bernoulli(double probability) { return uniform() < probability; }
 
 std::vector<std::size_t> Stream::permutation(std::size_t n) {
-  std::vector<std::size_t> order(n);
-  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<std::size_t> order = indices(n);
   for (std::size_t i = n; i > 1; --i) std::swap(order[i - 1], order[below(i)]);
   return order;
 }

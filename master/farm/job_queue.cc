@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numeric>
 #include <random>
 
 #include "common/base/ranges.h"
@@ -60,8 +59,7 @@ void JobQueue::start(std::string problem_hash, std::vector<v1::Task> tasks,
   problem_hash_ = std::move(problem_hash);
   jobs_.resize(tasks.size());
   for (std::size_t i = 0; i < tasks.size(); ++i) jobs_[i].task = std::move(tasks[i]);
-  std::vector<std::size_t> order(jobs_.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<std::size_t> order = indices(jobs_.size());
   if (shuffle_seed) {
     // Fisher-Yates by hand: the order of std::shuffle differs between libraries.
     std::mt19937_64 random(*shuffle_seed ^ first_job_);

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/json/json.h"
-#include "common/math/importance.h"
 #include "common/math/rank_tests.h"
+#include "common/math/statistics.h"
 #include "common/trials/text/csv.h"
 #include "master/report/html.h"
 #include "master/run/run_history.h"

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/math/fronts.h"
 #include "master/evolve/genetic/genetic.h"
 #include "master/evolve/individual.h"
@@ -222,8 +224,8 @@ void Nsga2::take(std::vector<Individual> front) {
   };
   std::ranges::sort(front, by_birth);
   const std::size_t room = size_ - population_.size();
-  std::vector<Costs> costs;
-  for (const Individual& individual : front) costs.push_back(costs_of(individual.standing));
+  std::vector<Costs> costs =
+      mapped(front, [](const Individual& individual) { return costs_of(individual.standing); });
   std::vector<double> distances = crowding_distances(costs);
   while (front.size() > room) {
     const auto least = std::ranges::min_element(distances) - distances.begin();
@@ -231,11 +233,9 @@ void Nsga2::take(std::vector<Individual> front) {
     costs.erase(costs.begin() + least);
     distances = crowding_distances(costs);
   }
-  std::vector<std::size_t> order(front.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::ranges::stable_sort(
-      order, [&](std::size_t a, std::size_t b) { return distances[a] > distances[b]; });
-  for (const std::size_t i : order) population_.push_back(std::move(front[i]));
+  for (const std::size_t i : order_of(distances, std::greater<>())) {
+    population_.push_back(std::move(front[i]));
+  }
 }
 
 std::vector<Costs> Nsga2::front() const {

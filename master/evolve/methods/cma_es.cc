@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
+#include "common/base/ranges.h"
 #include "common/math/algebra.h"
 
 namespace gapfarm {
@@ -168,10 +168,7 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
   assert(proposed.size() == population() && standings.size() == proposed.size());
   if (anywhere_) begin(to_vector(proposed.front()));  // the first proposal was the mean itself
   evaluations_ += proposed.size();
-  std::vector<std::size_t> order(proposed.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(
-      order, [&](std::size_t a, std::size_t b) { return better(standings[a], standings[b]); });
+  const std::vector<std::size_t> order = order_of(standings, better);
   Eigen::MatrixXd steps(mean_.size(), static_cast<Eigen::Index>(population()));
   for (Eigen::Index i = 0; i < steps.cols(); ++i) {
     steps.col(i) = (to_vector(proposed[order[static_cast<std::size_t>(i)]]) - mean_) / sigma_;

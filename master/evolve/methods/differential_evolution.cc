@@ -5,7 +5,6 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "common/base/ranges.h"
 #include "master/evolve/individual.h"
@@ -26,11 +25,7 @@ DifferentialEvolution::DifferentialEvolution(const MethodSetup& setup)
       keep_(setup.start) {}
 
 std::vector<Genome> DifferentialEvolution::propose(const StreamOf& stream_of) const {
-  std::vector<std::size_t> order(population_.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
-    return better(population_[a].standing, population_[b].standing);
-  });
+  const std::vector<std::size_t> order = order_of(population_, better_individual);
   const auto elite =
       std::max<std::size_t>(2, static_cast<std::size_t>(kBestShare * static_cast<double>(size_)));
   std::vector<Genome> proposed;

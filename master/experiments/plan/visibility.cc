@@ -66,8 +66,7 @@ Overrides with_effect(const Study& study, const EffectDraw& draw, double strengt
 
 // Simulates every shift at its strength; those that cannot be are tried at half of it.
 Status simulate_shifts(Predictor& predictor, const Study& study, std::vector<Shift>* shifts) {
-  std::vector<std::size_t> open(shifts->size());
-  for (std::size_t k = 0; k < open.size(); ++k) open[k] = k;
+  std::vector<std::size_t> open = indices(shifts->size());
   for (int half = 0; half <= kMostHalvings && !open.empty(); ++half) {
     std::vector<PredictionRequest> requests;
     for (const std::size_t k : open) {

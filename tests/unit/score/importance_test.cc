@@ -1,11 +1,10 @@
-#include "common/math/importance.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 #include <vector>
 
+#include "common/math/statistics.h"
 #include "common/random/stream.h"
 
 namespace gapfarm::importance_test {
