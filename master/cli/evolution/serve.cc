@@ -84,20 +84,13 @@ Json measured_json(const Trial& trial, double duration_s) {
 std::vector<v1::Override> muted(const Problem& problem, ParameterValues values) {
   const ParameterTable& table = problem.table();
   table.without_chance(&values);
-  std::vector<v1::Override> overrides;
-  const auto set = [&](std::size_t row, double value) {
-    v1::Override& to = overrides.emplace_back();
-    to.set_parameter(static_cast<std::uint32_t>(row));
-    to.set_value(value);
-  };
   for (std::size_t row = 0; row < table.size(); ++row) {
     const std::string& key = table[row].key;
     const bool noise = key.starts_with("drive_noise_") || key.starts_with("push_noise_") ||
                        key.starts_with("pose_noise_");
-    const double value = noise ? table[row].lower : values[row];
-    if (value != problem.values[row]) set(row, value);
+    if (noise) values[row] = table[row].lower;
   }
-  return overrides;
+  return overrides_of(problem.values, values);
 }
 
 v1::Task drive_task(const Problem& problem, const Trial& trial, const ParameterValues& values) {

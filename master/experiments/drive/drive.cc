@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/random/stream.h"
+#include "master/farm/planned_trials.h"
 
 namespace gapfarm {
 namespace {
@@ -240,23 +241,17 @@ Result<std::vector<ConstantVelocity>> nominal_velocities(Farm& farm, const Probl
 Result<std::vector<DrivenRun>> drive_commands(Farm& farm, const Problem& problem, const Pose& X_WS,
                                               const std::vector<CommandSpec>& commands,
                                               unsigned runs, const DriveSettings& settings) {
-  std::vector<v1::Task> tasks;
-  for (unsigned r = 0; r < runs; ++r) {
-    v1::Task task;
-    v1::SimulateTask* simulate = task.mutable_simulate();
-    simulate->mutable_stream()->set_run_seed(settings.seed);
-    simulate->mutable_stream()->set_birth_id(r);
-    simulate->set_path_interval(settings.interval_s);
-    double t_s = 0;
-    for (std::size_t c = 0; c < commands.size(); ++c) {
-      v1::PlannedTrial* plan = simulate->add_plan();
-      plan->set_moved(c == 0);
-      *plan->mutable_trial() = to_proto(planned_leg(commands[c], c, t_s, X_WS, settings));
-      t_s += commands[c].duration_s + kPause_s;
-    }
-    tasks.push_back(std::move(task));
+  std::vector<v1::PlannedTrial> plan(commands.size());
+  double t_s = 0;
+  for (std::size_t c = 0; c < commands.size(); ++c) {
+    plan[c].set_moved(c == 0);
+    *plan[c].mutable_trial() = to_proto(planned_leg(commands[c], c, t_s, X_WS, settings));
+    t_s += commands[c].duration_s + kPause_s;
   }
-  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
+  ASSIGN_OR_RETURN(
+      const auto results,
+      farm.run(farm.add_problem(to_proto(problem)),
+               simulate_tasks(std::vector(runs, plan), {}, settings.seed, settings.interval_s)));
   std::vector<DrivenRun> driven;
   for (const v1::TaskResult& result : results) {
     RETURN_IF_ERROR(ended_well(result, "a run"));
