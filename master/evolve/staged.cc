@@ -7,6 +7,20 @@
 namespace gapfarm {
 namespace {
 
+// The setup over the genes of one stage, which begins at those of `base`.
+OptimiserSetup part_of(const OptimiserSetup& whole, const Stage& stage, const Genome& base) {
+  OptimiserSetup part = whole;
+  part.genes.clear();
+  part.nominal.clear();
+  part.spread.clear();
+  part.given.clear();
+  for (const std::size_t gene : stage.genes) {
+    part.genes.push_back(whole.genes[gene]);
+    part.nominal.push_back(base[gene]);
+  }
+  return part;
+}
+
 class StagedOptimiser final : public Optimiser {
  public:
   StagedOptimiser(const OptimiserSetup& setup, std::vector<Stage> stages)
@@ -113,15 +127,7 @@ class StagedOptimiser final : public Optimiser {
   const Genome& base() const { return results_.empty() ? setup_.nominal : results_.back(); }
 
   OptimiserSetup stage_setup() const {
-    OptimiserSetup setup = setup_;
-    setup.genes.clear();
-    setup.nominal.clear();
-    setup.spread.clear();
-    setup.given.clear();
-    for (const std::size_t gene : stages_[stage_].genes) {
-      setup.genes.push_back(setup_.genes[gene]);
-      setup.nominal.push_back(base()[gene]);
-    }
+    OptimiserSetup setup = part_of(setup_, stages_[stage_], base());
     // Draws of its own: another stage with as many genes would repeat them.
     setup.run_seed = setup_.run_seed + 0x9e3779b97f4a7c15u * stage_;
     return setup;
@@ -183,15 +189,7 @@ Status check_stages(const OptimiserSetup& setup, const std::vector<Stage>& stage
   }
   // Every stage's own setup must be one that an optimiser takes.
   for (const Stage& stage : stages) {
-    OptimiserSetup part = setup;
-    part.genes.clear();
-    part.nominal.clear();
-    part.spread.clear();
-    for (const std::size_t gene : stage.genes) {
-      part.genes.push_back(setup.genes[gene]);
-      part.nominal.push_back(setup.nominal[gene]);
-    }
-    if (const auto made = make_optimiser(part); !made) return made.error();
+    RETURN_IF_ERROR(make_optimiser(part_of(setup, stage, setup.nominal)));
   }
   return {};
 }
