@@ -1,9 +1,10 @@
 #include "common/trials/waypoint_log.h"
 
-#include <charconv>
 #include <cmath>
 #include <optional>
 
+#include "common/base/text.h"
+#include "common/trials/dialect.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 
@@ -13,22 +14,9 @@ namespace {
 constexpr double kDay_s = 86400;
 constexpr double kUnit_m = 0.01;
 
-std::vector<std::string_view> split_arguments(std::string_view line) {
-  std::vector<std::string_view> tokens;
-  std::size_t at = 0;
-  while ((at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos) {
-    const std::size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
-    tokens.push_back(line.substr(at, end - at));
-    at = end;
-  }
-  return tokens;
-}
-
 std::optional<double> number(std::string_view word) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) return {};
-  return value;
+  const auto value = parse_double(word);
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 // "16:12:42:973:999" in seconds of the day.
@@ -109,7 +97,7 @@ Result<WaypointLog> parse_waypoint_log(std::string_view text, const std::string&
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     ++line_number;
-    if (const auto expected = reader.take(split_arguments(text.substr(0, end)))) {
+    if (const auto expected = reader.take(words_of(trimmed(text.substr(0, end))))) {
       return text_error(file, {line_number, 1}, "a broken line", *expected);
     }
     text.remove_prefix(std::min(end + 1, text.size()));

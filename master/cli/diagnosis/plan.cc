@@ -1,12 +1,12 @@
 // gapfarm plan CONFIG|MODEL: what to drive so that a diagnosis sees most.
 #include <spdlog/fmt/fmt.h>
 
-#include <charconv>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/text.h"
 #include "common/trials/select.h"
+#include "common/trials/text/csv.h"
 #include "common/trials/write.h"
 #include "master/cli/diagnosis/plan_drive.h"
 #include "master/cli/subcommand.h"
@@ -45,8 +45,8 @@ Result<PlannedPlace> place_of(const std::string& text) {
   const std::size_t x = text.find('x');
   PlannedPlace place{};
   const auto read = [](std::string_view part, double* value) {
-    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), *value);
-    return error == std::errc() && end == part.data() + part.size() && *value > 0 && *value <= 1000;
+    *value = parse_double(part).value_or(0);
+    return *value > 0 && *value <= 1000;
   };
   const std::string_view first = std::string_view(text).substr(0, x);
   const std::string_view second =

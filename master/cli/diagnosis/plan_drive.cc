@@ -14,6 +14,7 @@
 #include "common/parameters/ground.h"
 #include "common/problem/run_files.h"
 #include "common/svg/svg.h"
+#include "common/trials/text/csv.h"
 #include "master/command/inputs.h"
 #include "master/experiments/plan/drive_plan.h"
 #include "master/io/logs/to_runs.h"
@@ -34,13 +35,8 @@ std::optional<double> number_of(std::string text) {
     scale = 0.01;
     text.pop_back();
   }
-  std::size_t used = 0;
-  try {
-    const double value = std::stod(text, &used);
-    if (used == text.size() && std::isfinite(value)) return scale * value;
-  } catch (const std::exception&) {  // no number
-  }
-  return std::nullopt;
+  const auto value = parse_double(text);
+  return value && std::isfinite(*value) ? std::optional(scale * *value) : std::nullopt;
 }
 
 Result<std::vector<plan::Wanted>> wanted_of(const std::vector<std::string>& texts) {
