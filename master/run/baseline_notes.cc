@@ -22,10 +22,8 @@ bool same_trials(const TrialLog& a, const TrialLog& b) {
   return std::equal(a.trials.begin(), a.trials.end(), b.trials.begin(), b.trials.end(), same);
 }
 
-std::string note(const Result<std::vector<BaselineScores>>& baselines,
-                 std::span<const double> scores, const std::string& how) {
-  const std::string sentence =
-      baseline_sentence(compare_with_baselines(*baselines, scores), "the model");
+std::string note(const std::vector<BaselineComparison>& baselines, const std::string& how) {
+  const std::string sentence = baseline_sentence(baselines, "the model");
   return sentence.empty() ? sentence : "without a simulation, " + how + ": " + sentence;
 }
 
@@ -53,11 +51,11 @@ Result<std::string> baseline_note(const Model& model, const TrialLog& log,
   const auto behind = trials_behind(model);
   if (behind && !same_trials(*behind, log)) {
     ASSIGN_OR_RETURN(const auto baselines, baseline_scores(*behind, log, model.commands));
-    return note(baselines, scores, "learned from the model's trials");
+    return note(compare_with_baselines(baselines, scores), "learned from the model's trials");
   }
   ASSIGN_OR_RETURN(const auto baselines,
                    crossfitted_baselines(log, model.commands, session_folds(log)));
-  return note(baselines, scores,
+  return note(compare_with_baselines(baselines, scores),
               behind ? kFromOthers : "learned from the other sessions of this log");
 }
 
@@ -67,9 +65,7 @@ Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& g
                    farm.run(farm.add_problem(to_proto(problem)), {prediction_task(genome, false)}));
   if (results.front().outcome() != v1::OK) return std::string();
   ASSIGN_OR_RETURN(const auto beside, baselines_beside(problem, results.front().predict()));
-  const std::string sentence = baseline_sentence(beside, "the model");
-  return sentence.empty() ? sentence
-                          : std::string("without a simulation, ") + kFromOthers + ": " + sentence;
+  return note(beside, kFromOthers);
 }
 
 Result<std::vector<BaselineComparison>> baselines_beside(const Problem& problem,
