@@ -93,28 +93,6 @@ std::size_t Selection::pick(Stream& stream) const {
   return std::min(static_cast<std::size_t>(found - cumulative_.begin()), cumulative_.size() - 1);
 }
 
-const char* crossover_name(CrossoverKind kind) {
-  switch (kind) {
-    case CrossoverKind::kOnePoint:
-      return "one_point";
-    case CrossoverKind::kUniform:
-      return "uniform";
-    case CrossoverKind::kBlend:
-      return "blend";
-  }
-  return "?";
-}
-
-const char* mutation_name(MutationKind kind) {
-  switch (kind) {
-    case MutationKind::kGaussian:
-      return "gaussian";
-    case MutationKind::kUniformReset:
-      return "uniform_reset";
-  }
-  return "?";
-}
-
 Genome crossed(CrossoverKind kind, const Genome& a, const Genome& b, const GeneSpace& space,
                double alpha, Stream& stream) {
   assert(a.size() == space.size() && b.size() == space.size());
@@ -158,54 +136,51 @@ Genome mutated(MutationKind kind, Genome genome, const GeneSpace& space, double 
 
 namespace {
 
-unsigned origin_of(CrossoverKind kind) {
-  switch (kind) {
-    case CrossoverKind::kOnePoint:
-      return kOnePoint;
-    case CrossoverKind::kUniform:
-      return kUniform;
-    case CrossoverKind::kBlend:
-      return kBlend;
-  }
-  return 0;
+// The bits of the operators stand in the order of their kinds.
+constexpr unsigned origin_of(CrossoverKind kind) {
+  return kOnePoint << static_cast<unsigned>(kind);
 }
+constexpr unsigned origin_of(MutationKind kind) { return kGaussian << static_cast<unsigned>(kind); }
+static_assert(origin_of(CrossoverKind::kUniform) == kUniform &&
+              origin_of(CrossoverKind::kBlend) == kBlend &&
+              origin_of(MutationKind::kUniformReset) == kUniformReset);
 
-unsigned origin_of(MutationKind kind) {
-  return kind == MutationKind::kGaussian ? kGaussian : kUniformReset;
-}
+struct Arms {
+  std::vector<std::string> names;
+  std::vector<double> start;
 
-template <class Kind, class NameOf>
-Roulette sequence_roulette(const char* none, const std::vector<Kind>& kinds, NameOf name_of,
-                           double probability, const EvolutionSettings& settings) {
-  std::vector<std::string> names = {none};
-  std::vector<double> start = {kinds.empty() ? 1 : 1 - probability};
-  for (Kind kind : kinds) {
-    names.emplace_back(name_of(kind));
-    start.push_back(probability / static_cast<double>(kinds.size()));
+  // One a kind, `probability` among them.
+  template <class Kind>
+  void add(const std::vector<Kind>& kinds, double probability) {
+    for (const Kind kind : kinds) {
+      names.push_back(origin_name(origin_of(kind)));
+      start.push_back(probability / static_cast<double>(kinds.size()));
+    }
   }
-  return {std::move(names), std::move(start), settings.probability_floor, settings.self_adaptation};
+  Roulette roulette(const EvolutionSettings& settings) const {
+    return {names, start, settings.probability_floor, settings.self_adaptation};
+  }
+};
+
+template <class Kind>
+Roulette sequence_roulette(const char* none, const std::vector<Kind>& kinds, double probability,
+                           const EvolutionSettings& settings) {
+  Arms arms{{none}, {kinds.empty() ? 1 : 1 - probability}};
+  arms.add(kinds, probability);
+  return arms.roulette(settings);
 }
 
 Roulette separate_roulette(const EvolutionSettings& settings) {
-  const auto crossovers = static_cast<double>(settings.crossovers.size());
-  const auto mutations = static_cast<double>(settings.mutations.size());
   double pc = settings.crossovers.empty() ? 0 : settings.crossover_probability;
   double pm = settings.mutations.empty() ? 0 : settings.mutation_probability;
   if (pc + pm <= 0) {
-    pc = crossovers;
-    pm = mutations;
+    pc = static_cast<double>(settings.crossovers.size());
+    pm = static_cast<double>(settings.mutations.size());
   }
-  std::vector<std::string> names;
-  std::vector<double> start;
-  for (CrossoverKind kind : settings.crossovers) {
-    names.emplace_back(crossover_name(kind));
-    start.push_back(pc / (pc + pm) / crossovers);
-  }
-  for (MutationKind kind : settings.mutations) {
-    names.emplace_back(mutation_name(kind));
-    start.push_back(pm / (pc + pm) / mutations);
-  }
-  return {std::move(names), std::move(start), settings.probability_floor, settings.self_adaptation};
+  Arms arms;
+  arms.add(settings.crossovers, pc / (pc + pm));
+  arms.add(settings.mutations, pm / (pc + pm));
+  return arms.roulette(settings);
 }
 
 // Two parents that differ where a few draws can have it so.
@@ -229,9 +204,9 @@ Breeder::Breeder(const EvolutionSettings& settings, GeneSpace space)
   if (settings.order == VariationOrder::kSeparate) {
     roulettes_.push_back(separate_roulette(settings));
   } else {
-    roulettes_.push_back(sequence_roulette("no_crossover", settings.crossovers, crossover_name,
+    roulettes_.push_back(sequence_roulette("no_crossover", settings.crossovers,
                                            settings.crossover_probability, settings));
-    roulettes_.push_back(sequence_roulette("no_mutation", settings.mutations, mutation_name,
+    roulettes_.push_back(sequence_roulette("no_mutation", settings.mutations,
                                            settings.mutation_probability, settings));
   }
 }

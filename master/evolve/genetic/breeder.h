@@ -12,9 +12,6 @@
 
 namespace gapfarm {
 
-const char* crossover_name(CrossoverKind kind);  // "one_point", "uniform", "blend"
-const char* mutation_name(MutationKind kind);    // "gaussian", "uniform_reset"
-
 // One child of two parents of the same space.
 //   one_point: a's genes before a cut, b's from it on; the cut leaves each at least one gene.
 //   uniform:   each gene from either with equal probability.
