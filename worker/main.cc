@@ -44,7 +44,6 @@ struct Arguments : ServiceOptions {
   ProcessLimits limits;
   bool allow_external = false;
   int parent = 0;
-  std::string replaced_end = "left";
 };
 
 void describe(CLI::App& app, Arguments* arguments) {
@@ -96,18 +95,12 @@ void describe(CLI::App& app, Arguments* arguments) {
   app.add_flag("--announce", arguments->announce)->group("");
   app.add_option("--parent", arguments->parent)->group("");
   app.add_option("--replaces", arguments->session.replaces)->group("");
-  app.add_option("--replaced-end", arguments->replaced_end)
-      ->check(CLI::IsMember({"left", "killed", "crashed", "hung"}))
+  app.add_option("--replaced-end", arguments->session.replaced_end)
+      ->check(CLI::Range(0, int{v1::ProcessEnd_MAX}))
       ->group("");
   app.add_option("--replaced-epoch", arguments->session.replaced_epoch)->group("");
   app.add_option("--replaced-attempt", arguments->session.replaced_attempt)->group("");
   app.add_option("--replaced-failure", arguments->session.replaced_failure)->group("");
-}
-
-v1::ProcessEnd process_end(const std::string& word) {
-  if (word == "crashed") return v1::PROCESS_CRASHED;
-  if (word == "killed") return v1::PROCESS_KILLED;
-  return word == "hung" ? v1::PROCESS_HUNG : v1::PROCESS_LEFT;
 }
 
 int complain(const Error& error, int status) {
@@ -139,7 +132,6 @@ int work(const Arguments& arguments) {
   options.session.pid = getpid();
   options.session.fingerprint = build_info().fingerprint;
   options.session.numeric_class = numeric_class();
-  options.session.replaced_end = process_end(arguments.replaced_end);
   if (arguments.lifetime_s > 0) {
     options.session.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   }

@@ -9,23 +9,16 @@
 #include <cstdio>
 
 #include "common/base/clock.h"
+#include "gapfarm/v1/farm.pb.h"
 
 namespace gapfarm {
 namespace {
 
-const char* word(EndCause cause) {
-  switch (cause) {
-    case EndCause::kCrashed:
-      return "crashed";
-    case EndCause::kHung:
-      return "hung";
-    case EndCause::kKilled:
-      return "killed";
-    case EndCause::kStuck:
-    case EndCause::kLeft:
-      break;
-  }
-  return "left";
+// As the master hears of it; one that did not answer has no blame.
+v1::ProcessEnd reported(EndCause cause) {
+  if (cause == EndCause::kCrashed) return v1::PROCESS_CRASHED;
+  if (cause == EndCause::kKilled) return v1::PROCESS_KILLED;
+  return cause == EndCause::kHung ? v1::PROCESS_HUNG : v1::PROCESS_LEFT;
 }
 
 ProcessPoolOptions pool_options(const SupervisorOptions& options) {
@@ -46,8 +39,9 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
     if (name.rfind(prefix + "-1.", 0) == 0) all.push_back("--announce");
     if (replaced != nullptr) {
       all.insert(all.end(),
-                 {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
-                  "--replaced-epoch", std::to_string(replaced->epoch), "--replaced-attempt",
+                 {"--replaces", replaced->name, "--replaced-end",
+                  std::to_string(reported(replaced->cause)), "--replaced-epoch",
+                  std::to_string(replaced->epoch), "--replaced-attempt",
                   std::to_string(replaced->attempt), "--replaced-failure", replaced->failure});
     }
     if (std::isfinite(deadline)) {

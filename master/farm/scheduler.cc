@@ -22,16 +22,9 @@ constexpr const char* kImpure =
     ", else this machine computes wrongly";
 
 EndCause cause_of(v1::ProcessEnd end) {
-  switch (end) {
-    case v1::PROCESS_KILLED:
-      return EndCause::kKilled;
-    case v1::PROCESS_CRASHED:
-      return EndCause::kCrashed;
-    case v1::PROCESS_HUNG:
-      return EndCause::kHung;
-    default:
-      return EndCause::kLeft;
-  }
+  if (end == v1::PROCESS_CRASHED) return EndCause::kCrashed;
+  if (end == v1::PROCESS_KILLED) return EndCause::kKilled;
+  return end == v1::PROCESS_HUNG ? EndCause::kHung : EndCause::kLeft;
 }
 
 auto find_holding(WorkerRecord& worker, std::uint64_t attempt) {
