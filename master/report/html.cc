@@ -104,9 +104,9 @@ std::string html_table(std::string_view css, std::string_view file, std::string_
       R"(<table class="{}" data-file="{}"><caption class="unseen">{}</caption><thead><tr>)", css,
       html_escaped(file), html_escaped(caption));
   for (const HtmlColumn& column : columns) {
-    html +=
-        fmt::format(R"(<th scope="col"{}>{}</th>)",
-                    column.css.rfind("number", 0) == 0 ? R"( class="number")" : "", column.head);
+    html += fmt::format(R"(<th scope="col"{}{}>{}</th>)",
+                        column.css.rfind("number", 0) == 0 ? R"( class="number")" : "",
+                        column.sorted_by ? R"( aria-sort="descending")" : "", column.head);
   }
   html += "</tr></thead><tbody>";
   for (const HtmlRow& row : rows) {

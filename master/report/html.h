@@ -35,6 +35,7 @@ struct HtmlColumn {
   std::string head;
   std::string css = {};  // of its cells; the head of "number ..." is aligned alike
   std::string label = {};
+  bool sorted_by = false;  // the rows are, descending
 };
 
 struct HtmlRow {

@@ -66,7 +66,7 @@ std::string unit_html(const std::string& unit) {
   return unit == "nats/trial" ? term("nat", unit) : html_escaped(unit);
 }
 
-std::string row_of_entry(const WorkEntry& e) {
+HtmlRow row_of_entry(const WorkEntry& e) {
   const bool run = e.kind == FoundWork::Kind::kRun && e.trouble.empty();
   const std::string box =
       run ? fmt::format(
@@ -83,14 +83,13 @@ std::string row_of_entry(const WorkEntry& e) {
     extent = fmt::format("generation {}<small>{} evaluations</small>", e.generation,
                          number_text(static_cast<double>(e.evaluations), 9));
   }
-  return fmt::format(R"(<tr><th scope="row">{}<a href="/view?of={}">{}</a><small>{}</small></th>)",
-                     box, percent_encoded(e.name), html_escaped(e.name), html_escaped(e.what)) +
-         list_cell("state", state_text(e)) + list_cell("best", best, true) +
-         list_cell("by generation", spark(e)) + list_cell("so far", extent) +
-         list_cell("trials", run ? std::to_string(e.trials) : "", true) +
-         list_cell("seed", run ? std::to_string(e.seed) : "", true) +
-         list_cell(run ? "config" : "command", "<small>" + html_escaped(e.config) + "</small>") +
-         list_cell("last heard of", utc_text(e.changed_unix_s)) + "</tr>";
+  const std::string head =
+      fmt::format(R"({}<a href="/view?of={}">{}</a><small>{}</small>)", box,
+                  percent_encoded(e.name), html_escaped(e.name), html_escaped(e.what));
+  return {head,
+          {state_text(e), best, spark(e), extent, run ? std::to_string(e.trials) : "",
+           run ? std::to_string(e.seed) : "", "<small>" + html_escaped(e.config) + "</small>",
+           utc_text(e.changed_unix_s)}};
 }
 
 std::string list_address(const ListView& view, const std::string& sort) {
@@ -100,11 +99,25 @@ std::string list_address(const ListView& view, const std::string& sort) {
   return html_escaped(address);
 }
 
-std::string sorted_head(const char* key, const char* label, const ListView& view,
-                        bool is_number = false) {
-  return fmt::format(
-      R"(<th scope="col"{}{}><a href="{}">{}</a></th>)", is_number ? R"( class="number")" : "",
-      view.sort == key ? R"( aria-sort="descending")" : "", list_address(view, key), label);
+// A column whose head sorts by it.
+HtmlColumn sorted_column(const char* key, const char* label, const ListView& view,
+                         const char* css = "") {
+  return {fmt::format(R"(<a href="{}">{}</a>)", list_address(view, key), label), css, label,
+          view.sort == key};
+}
+
+std::string work_table(const std::vector<WorkEntry>& entries, const ListView& view) {
+  return html_table("cards work", "work", "Runs and diagnoses",
+                    {sorted_column("name", "name", view),
+                     sorted_column("state", "state", view),
+                     sorted_column("best", "best", view, "number"),
+                     {"by generation"},
+                     {"so far"},
+                     sorted_column("trials", "trials", view, "number"),
+                     sorted_column("seed", "seed", view, "number"),
+                     sorted_column("config", "config", view),
+                     sorted_column("changed", "last heard of", view)},
+                    mapped(entries, row_of_entry));
 }
 
 void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
@@ -158,28 +171,23 @@ std::string comparison_table(std::span<const RunReport> runs) {
       if (!contains(keys, row.key, &ParameterRow::key)) keys.push_back(&row);
     }
   }
-  std::string html =
-      R"(<table class="cards" data-file="compared"><caption class="unseen">Parameters side by side</caption><thead><tr><th scope="col">parameter</th>)";
-  for (const RunReport& run : runs) {
-    html += R"(<th scope="col" class="number">)" + html_escaped(run.name) + "</th>";
-  }
-  html += "</tr></thead><tbody>";
+  std::vector<HtmlColumn> columns = {{"parameter"}};
+  for (const RunReport& run : runs) columns.push_back({html_escaped(run.name), "number"});
+  std::vector<HtmlRow> rows;
   for (const ParameterRow* key : keys) {
-    html += R"(<tr><th scope="row"><code>)" + html_escaped(key->key) + "</code> <small>" +
-            html_escaped(key->unit == "-" ? "" : key->unit) + "</small></th>";
+    HtmlRow& line = rows.emplace_back();
+    line.head = "<code>" + html_escaped(key->key) + "</code> <small>" +
+                html_escaped(key->unit == "-" ? "" : key->unit) + "</small>";
     for (const RunReport& run : runs) {
       const auto row = std::ranges::find(run.parameters, key->key, &ParameterRow::key);
-      std::string value = "–";
-      if (row != run.parameters.end()) {
-        value = row->choice.empty() ? number_text(row->after, 4) : html_escaped(row->choice);
-        if (bound_hit(*row) != BoundHit::kNone)
-          value += R"( <small class="worse">▲ )" + term("bound", "at its bound") + "</small>";
-      }
-      html += list_cell(html_escaped(run.name).c_str(), value, true);
+      std::string& value = line.cells.emplace_back("–");
+      if (row == run.parameters.end()) continue;
+      value = row->choice.empty() ? number_text(row->after, 4) : html_escaped(row->choice);
+      if (bound_hit(*row) != BoundHit::kNone)
+        value += R"( <small class="worse">▲ )" + term("bound", "at its bound") + "</small>";
     }
-    html += "</tr>";
   }
-  return html + "</tbody></table>";
+  return html_table("cards", "compared", "Parameters side by side", columns, rows);
 }
 
 }  // namespace
@@ -215,15 +223,7 @@ std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
   }
   frame.body += filter_form(view) + R"(<form action="/compare"><div id="entries" data-live>)";
   if (!entries.empty()) {
-    frame.body +=
-        R"(<table class="cards work" data-file="work"><caption class="unseen">Runs and diagnoses</caption><thead><tr>)" +
-        sorted_head("name", "name", view) + sorted_head("state", "state", view) +
-        sorted_head("best", "best", view, true) + R"(<th scope="col">by generation</th>)" +
-        R"(<th scope="col">so far</th>)" + sorted_head("trials", "trials", view, true) +
-        sorted_head("seed", "seed", view, true) + sorted_head("config", "config", view) +
-        sorted_head("changed", "last heard of", view) + "</tr></thead><tbody>";
-    for (const WorkEntry& e : entries) frame.body += row_of_entry(e);
-    frame.body += "</tbody></table>";
+    frame.body += work_table(entries, view);
   } else if (all > 0) {
     frame.body += R"(<p>None of them fits the filter. <a href="/">Show all</a></p>)";
   }
@@ -279,11 +279,6 @@ Json plain_page_json() {
 Json no_trials_json() {
   const auto none = Json::array();
   return {{"columns", none}, {"rows", none}};
-}
-
-std::string list_cell(const char* label, const std::string& html, bool is_number) {
-  return fmt::format(R"(<td data-label="{}" class="{}{}">{}</td>)", label,
-                     is_number ? "number" : "", html.empty() ? " empty" : "", html);
 }
 
 }  // namespace gapfarm

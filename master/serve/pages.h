@@ -41,7 +41,4 @@ std::string utc_text(double unix_s);
 Json plain_page_json();
 Json no_trials_json();
 
-// Where rows become cards, on a narrow screen, cells without content are omitted.
-std::string list_cell(const char* label, const std::string& html, bool is_number = false);
-
 }  // namespace gapfarm
