@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include "common/base/text.h"
 
@@ -13,6 +14,14 @@ std::string format_duration(double seconds) {
   if (whole < 60) return formatted("%ld s", whole);
   if (whole < 3600) return formatted("%ld min %02ld s", whole / 60, whole % 60);
   return formatted("%ld h %02ld min", whole / 3600, whole / 60 % 60);
+}
+
+std::string utc_text(double unix_s, const char* format) {
+  const auto seconds = static_cast<std::time_t>(unix_s);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[40];
+  return {text, std::strftime(text, sizeof text, format, &utc)};
 }
 
 std::string format_share(double share) {

@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <ctime>
 #include <fstream>
 #include <map>
 #include <set>
@@ -171,13 +170,7 @@ std::vector<std::string> log_tail(const std::filesystem::path& run) {
   return lines;
 }
 
-std::string day_and_time(double unix_s) {
-  const auto seconds = static_cast<std::time_t>(unix_s);
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  return fmt::format("{:02}-{:02} {:02}:{:02} UTC", utc.tm_mon + 1, utc.tm_mday, utc.tm_hour,
-                     utc.tm_min);
-}
+std::string day_and_time(double unix_s) { return utc_text(unix_s, "%m-%d %H:%M UTC"); }
 
 void add_facts(const RunStatus& status, RunFarm* farm) {
   const auto add = [&](const std::string& label, const std::string& value) {

@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <ctime>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -89,7 +88,7 @@ HtmlRow row_of_entry(const WorkEntry& e) {
   return {head,
           {state_text(e), best, spark(e), extent, run ? std::to_string(e.trials) : "",
            run ? std::to_string(e.seed) : "", "<small>" + html_escaped(e.config) + "</small>",
-           utc_text(e.changed_unix_s)}};
+           e.changed_unix_s > 0 ? utc_text(e.changed_unix_s, "%Y-%m-%d %H:%M UTC") : "–"}};
 }
 
 std::string list_address(const ListView& view, const std::string& sort) {
@@ -191,15 +190,6 @@ std::string comparison_table(std::span<const RunReport> runs) {
 }
 
 }  // namespace
-
-std::string utc_text(double unix_s) {
-  if (!(unix_s > 0)) return "–";
-  const auto seconds = static_cast<std::time_t>(unix_s);
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02} UTC", utc.tm_year + 1900, utc.tm_mon + 1,
-                     utc.tm_mday, utc.tm_hour, utc.tm_min);
-}
 
 std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
                       const std::vector<std::string>& folders) {

@@ -34,9 +34,6 @@ std::string compare_page(std::span<const RunReport> runs);
 // Prometheus' text format.
 std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_s);
 
-// "2026-11-22 02:41 UTC"; a dash for 0.
-std::string utc_text(double unix_s);
-
 // The data of a page that has no plots, and of one without trials.
 Json plain_page_json();
 Json no_trials_json();

@@ -5,13 +5,13 @@
 
 #include <cerrno>
 #include <cstring>
-#include <ctime>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "common/base/build_info.h"
 #include "common/base/text.h"
 #include "common/json/json.h"
+#include "common/progress/number_text.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"
 
@@ -19,15 +19,6 @@ namespace gapfarm {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string utc_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
-}
 
 // Forces a file's or folder's content to disk.
 Status sync_to_disk(const fs::path& path) {
@@ -106,7 +97,7 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   RunInfo complete = info;
   if (complete.program_version.empty()) complete.program_version = build_info().version;
   if (complete.fingerprint.empty()) complete.fingerprint = build_info().fingerprint;
-  complete.created = utc_now();
+  complete.created = utc_text(unix_now_s(), "%Y-%m-%dT%H:%M:%SZ");
   RETURN_IF_ERROR(create_tables(database, complete));
   RETURN_IF_ERROR(sync_to_disk(run));
 
