@@ -17,7 +17,6 @@
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "common/trials/files.h"
-#include "master/report/figures/line_chart.h"
 #include "master/report/html.h"
 #include "master/report/prediction_table.h"
 #include "master/run/baseline_notes.h"
@@ -194,19 +193,6 @@ Status write_poses(RunStore& store, const Problem& problem, const EvolveSummary&
                                             "ellipses hold 90 % of the simulated positions"));
 }
 
-Status write_fitness(const RunStore& store) {
-  ASSIGN_OR_RETURN(const auto reader, RunReader::open(store.run()));
-  ASSIGN_OR_RETURN(const auto generations, reader.generations());
-  std::vector<FitnessPoint> points;
-  for (const StoredGeneration& g : generations) {
-    points.push_back({g.generation, g.best, g.median, g.worst});
-  }
-  const RunInfo& info = store.info();
-  return write_file_atomically((store.run() / "fitness.svg").string(),
-                               fitness_chart(points, "Fitness by generation", info.fitness,
-                                             info.fitness_unit, info.higher_is_better));
-}
-
 // In place of the one that the run left when it last ended; one that it did not leave is kept.
 Status replace_model(RunStore& store, const Model& model, RunWatcher& watcher) {
   const std::string file = (store.run() / "model.toml").string();
@@ -223,8 +209,10 @@ Status replace_model(RunStore& store, const Model& model, RunWatcher& watcher) {
   return store.keep_document("model", quoted_hash(format_model(model)));
 }
 
-Status write_page(const RunStore& store, RunWatcher& watcher) {
+Status write_pages(const RunStore& store, RunWatcher& watcher) {
   ASSIGN_OR_RETURN(const auto report, read_run_report({store.run(), {}, {}}));
+  RETURN_IF_ERROR(
+      write_file_atomically((store.run() / "fitness.svg").string(), fitness_chart(report)));
   if (const auto keys = keys_at_bounds(report.parameters); !keys.empty()) {
     watcher.note(
         fmt::format("at the end of its range in [genes]: {}; a better value may lie beyond",
@@ -346,8 +334,7 @@ Status write_outputs(RunStore& store, const Problem& problem, const Config& conf
   if (!is_value(problem.fitness.kind)) {
     RETURN_IF_ERROR(write_poses(store, problem, summary, farm, validated));
   }
-  RETURN_IF_ERROR(write_fitness(store));
-  return write_page(store, watcher);
+  return write_pages(store, watcher);
 }
 
 }  // namespace gapfarm

@@ -190,41 +190,6 @@ std::string line_chart(const LineChart& chart) {
   return svg.finish();
 }
 
-std::string fitness_chart(const std::vector<FitnessPoint>& points, const std::string& title,
-                          const std::string& fitness, const std::string& unit,
-                          bool higher_is_better) {
-  LineChart chart;
-  chart.title = title;
-  chart.x_title = "generation";
-  chart.y_title = fitness + (unit.empty() || unit == "-" ? "" : " (" + unit + ")") +
-                  (higher_is_better ? ", higher is better" : ", lower is better");
-  chart.whole_x = true;
-  ChartSeries best{.name = "best, and down to the worst", .line = {}, .lower = {}, .upper = {}};
-  ChartSeries median{.name = "median", .line = {}, .lower = {}, .upper = {}};
-  std::vector<double> medians;
-  for (const FitnessPoint& point : points) {
-    if (!point.best || !point.median || !point.worst) continue;
-    const auto x = static_cast<double>(point.generation);
-    best.line.push_back({x, *point.best});
-    best.lower.push_back({x, *point.worst});
-    median.line.push_back({x, *point.median});
-    medians.push_back(*point.median);
-  }
-  best.upper = best.line;
-  if (!medians.empty()) {
-    // Toward the bad side: nine tenths of the medians.
-    std::ranges::sort(medians);
-    const std::size_t tenth = medians.size() / 10;
-    if (higher_is_better) {
-      chart.y_least = medians[tenth];
-    } else {
-      chart.y_most = medians[medians.size() - 1 - tenth];
-    }
-  }
-  chart.series = {best, median};
-  return line_chart(chart);
-}
-
 std::string bar_chart(const std::string& title, const std::string& x_title,
                       const std::vector<ChartBar>& bars, std::optional<double> mark,
                       const std::string& mark_name) {

@@ -1,7 +1,6 @@
 // Lines with bands over a common axis, as SVG.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,17 +36,6 @@ struct LineChart {
 std::string series_colour(std::size_t i);
 
 std::string line_chart(const LineChart& chart);
-
-struct FitnessPoint {
-  std::uint64_t generation = 0;
-  std::optional<double> best, median, worst;  // none: no individual of the generation was OK
-};
-
-// Fitness by generation: best over the band from best to worst, and median.  The scale follows the
-// best and the bulk of the medians; what is worse is cut off at the frame.
-std::string fitness_chart(const std::vector<FitnessPoint>& points, const std::string& title,
-                          const std::string& fitness, const std::string& unit,
-                          bool higher_is_better);
 
 struct ChartBar {
   std::string name;

@@ -9,6 +9,7 @@
 #include "common/math/digits.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
+#include "master/report/figures/line_chart.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -276,6 +277,39 @@ Result<RunOutcome> parse_run_outcome(const std::string& text) {
   if (!trials) return trials.error();
   outcome.trials = std::move(*trials);
   return outcome;
+}
+
+std::string fitness_chart(const RunReport& report) {
+  LineChart chart;
+  chart.title = "Fitness by generation";
+  chart.x_title = "generation";
+  chart.y_title = report.fitness + (report.unit == "-" ? "" : " (" + report.unit + ")") +
+                  (report.higher_is_better ? ", higher is better" : ", lower is better");
+  chart.whole_x = true;
+  ChartSeries best{.name = "best, and down to the worst", .line = {}, .lower = {}, .upper = {}};
+  ChartSeries median{.name = "median", .line = {}, .lower = {}, .upper = {}};
+  std::vector<double> medians;
+  for (const RunGeneration& point : report.generations) {
+    if (!point.best || !point.median || !point.worst) continue;
+    const auto x = static_cast<double>(point.generation);
+    best.line.push_back({x, *point.best});
+    best.lower.push_back({x, *point.worst});
+    median.line.push_back({x, *point.median});
+    medians.push_back(*point.median);
+  }
+  best.upper = best.line;
+  if (!medians.empty()) {
+    // Toward the bad side: nine tenths of the medians.
+    std::ranges::sort(medians);
+    const std::size_t tenth = medians.size() / 10;
+    if (report.higher_is_better) {
+      chart.y_least = medians[tenth];
+    } else {
+      chart.y_most = medians[medians.size() - 1 - tenth];
+    }
+  }
+  chart.series = {best, median};
+  return line_chart(chart);
 }
 
 std::string run_html(const RunReport& report) {

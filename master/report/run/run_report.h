@@ -188,4 +188,8 @@ std::vector<Point> decimated(const std::vector<Point>& points, std::size_t most,
 // The whole file, UTF-8, as report_html() makes one.
 std::string run_html(const RunReport& report);
 
+// Fitness by generation, as SVG: best over the band from best to worst, and median.  The scale
+// follows the best and the bulk of the medians; what is worse is cut off at the frame.
+std::string fitness_chart(const RunReport& report);
+
 }  // namespace gapfarm

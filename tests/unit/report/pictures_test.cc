@@ -13,6 +13,7 @@
 #include "common/random/stream.h"
 #include "master/report/figures/line_chart.h"
 #include "master/report/figures/pose_picture.h"
+#include "master/report/run/run_report.h"
 
 namespace gapfarm::pictures_test {
 
@@ -115,22 +116,31 @@ TEST(PosePicture, BearsEmptyAndDegenerateInput) {
 }
 
 TEST(FitnessChart, ShowsARunOfEitherSense) {
-  std::vector<FitnessPoint> points;
+  RunReport report;
+  report.fitness = "robust_mahalanobis";
+  report.unit = "-";
+  report.higher_is_better = false;
   for (std::uint64_t g = 1; g <= 60; ++g) {
     const double t = static_cast<double>(g);
     const double best = 0.03 + 3 * std::exp(-t / 8);
-    points.push_back({g, best, best + 0.8 * std::exp(-t / 20), best + 6 * std::exp(-t / 30)});
+    report.generations.push_back({.generation = g,
+                                  .best = best,
+                                  .median = best + 0.8 * std::exp(-t / 20),
+                                  .worst = best + 6 * std::exp(-t / 30)});
   }
-  points[10] = {11, {}, {}, {}};  // nobody was OK
-  const std::string svg = fitness_chart(points, "run/demo", "robust_mahalanobis", "-", false);
+  report.generations[10].best = {};  // nobody was OK
+  const std::string svg = fitness_chart(report);
   keep("fitness.svg", svg);
   parse(svg);
   EXPECT_EQ(count(svg, "<polyline"), 2u);
   EXPECT_THAT(svg, HasSubstr("robust_mahalanobis, lower is better"));
-  EXPECT_THAT(fitness_chart(points, "t", "log_score", "nats/trial", true),
-              HasSubstr("log_score (nats/trial), higher is better"));
-  parse(fitness_chart({}, "t", "f", "", true));
-  parse(fitness_chart({{1, 2.0, 2.0, 2.0}}, "t", "f", "", true));
+  report.fitness = "log_score";
+  report.unit = "nats/trial";
+  report.higher_is_better = true;
+  EXPECT_THAT(fitness_chart(report), HasSubstr("log_score (nats/trial), higher is better"));
+  report.generations.resize(1);
+  parse(fitness_chart(report));
+  parse(fitness_chart(RunReport()));
 }
 
 }  // namespace gapfarm::pictures_test
