@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <set>
 
+#include "common/base/ranges.h"
 #include "common/config/sections.h"
 #include "common/problem/message_parts.h"
 #include "common/trials/text/csv.h"
@@ -163,36 +164,16 @@ namespace {
 // A pose in a log is that of the frame in which the corners are listed, or of the centroid.
 const std::vector<std::string> kOrigins = {"frame", "centroid"};
 
-std::optional<Eigen::Vector2d> read_corner(const toml::node& node) {
-  const toml::array* pair = node.as_array();
-  if (pair == nullptr || pair->size() != 2) return {};
-  const auto x = (*pair)[0].value<double>();
-  const auto y = (*pair)[1].value<double>();
-  if (!x || !y) return {};
-  return Eigen::Vector2d(*x, *y);
-}
-
-void read_corners(TomlSection& section, Piece& piece) {
-  const toml::node* node = section.find("corners");
-  if (node == nullptr) return;  // check_piece() misses them
-  const toml::array* list = node->as_array();
-  for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
-    const auto corner = read_corner((*list)[i]);
-    if (!corner) {
-      list = nullptr;
-      break;
-    }
-    piece.corners.push_back(*corner);
-  }
-  if (list == nullptr) section.fail("corners", "corners are pairs in m: [[0, 0], [0.1, 0], ...]");
-}
-
 void read_piece(const toml::table& table, const toml::node& node, TomlErrors& errors,
                 std::vector<Piece>& pieces) {
   TomlSection section(table, "[[pieces]]", errors);
   Piece piece;
   section.read("name", piece.name);
-  read_corners(section, piece);
+  // check_piece() misses those that are not there.
+  const auto corners =
+      section.rows("corners", 2, "corners are pairs in m: [[0, 0], [0.1, 0], ...]");
+  if (corners)
+    piece.corners = mapped(*corners, [](const auto& c) { return Eigen::Vector2d(c[0], c[1]); });
   const std::size_t origin = section.choice("origin", kOrigins).value_or(0);
   section.read("thickness", piece.thickness_m, 1e-4, 0.5, "m");
   section.read("mass", piece.mass_kg, 1e-4, 100, "kg");

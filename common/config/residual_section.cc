@@ -1,4 +1,3 @@
-#include <cmath>
 #include <optional>
 
 #include "common/config/sections.h"
@@ -19,30 +18,15 @@ std::vector<std::string> covariate_names() {
 // Rows of equally many finite numbers.
 std::optional<Eigen::MatrixXd> read_rows(TomlSection& section, const std::string& key,
                                          Eigen::Index columns) {
-  const toml::node* node = section.find(key);
-  if (node == nullptr) return std::nullopt;
-  const std::string expected =
-      key + " are rows of " + std::to_string(columns) + " finite numbers: [[0, ...], ...]";
-  const toml::array* list = node->as_array();
-  if (list == nullptr || list->empty()) {
-    section.fail(key, expected);
-    return std::nullopt;
+  const auto rows = section.rows(
+      key, static_cast<std::size_t>(columns),
+      key + " are rows of " + std::to_string(columns) + " finite numbers: [[0, ...], ...]");
+  if (!rows) return std::nullopt;
+  Eigen::MatrixXd matrix(rows->size(), columns);
+  for (std::size_t k = 0; k < rows->size(); ++k) {
+    matrix.row(k) = Eigen::RowVectorXd::Map((*rows)[k].data(), columns);
   }
-  Eigen::MatrixXd rows(list->size(), columns);
-  for (std::size_t k = 0; k < list->size(); ++k) {
-    const toml::array* row = (*list)[k].as_array();
-    bool sound = row != nullptr && static_cast<Eigen::Index>(row->size()) == columns;
-    for (Eigen::Index j = 0; sound && j < columns; ++j) {
-      const auto value = (*row)[j].value<double>();
-      sound = value && std::isfinite(*value);
-      if (sound) rows(k, j) = *value;
-    }
-    if (!sound) {
-      section.errors().add((*list)[k], expected);
-      return std::nullopt;
-    }
-  }
-  return rows;
+  return matrix;
 }
 
 void read_weights(TomlSection& section, const Model& model, ResidualTerm* term) {

@@ -202,6 +202,30 @@ std::optional<std::vector<double>> TomlSection::numbers(std::string_view key, do
       key, [&](const toml::node& element) { return number_of(key, element, lower, upper, unit); });
 }
 
+std::optional<std::vector<std::vector<double>>> TomlSection::rows(std::string_view key,
+                                                                  std::size_t columns,
+                                                                  const std::string& expected) {
+  auto all = list<std::vector<double>>(key, [&](const toml::node& element) {
+    std::optional<std::vector<double>> row(std::in_place);
+    if (const toml::array* numbers = element.as_array()) {
+      for (const toml::node& number : *numbers) {
+        if (const auto value = number.value<double>(); value && std::isfinite(*value)) {
+          row->push_back(*value);
+        }
+      }
+      if (numbers->size() == columns && row->size() == columns) return row;
+    }
+    errors_->add(element, expected);
+    row.reset();
+    return row;
+  });
+  if (all && all->empty()) {
+    fail(key, expected);
+    all.reset();
+  }
+  return all;
+}
+
 std::optional<TomlSection> TomlSection::section(std::string_view key) {
   const toml::node* node = find(key);
   if (node == nullptr) return {};

@@ -81,6 +81,9 @@ class TomlSection {
                                                   std::span<const std::string> names);
   std::optional<std::vector<double>> numbers(std::string_view key, double lower, double upper,
                                              std::string_view unit = "");
+  // One row or more of so many finite numbers; the error of others is `expected`.
+  std::optional<std::vector<std::vector<double>>> rows(std::string_view key, std::size_t columns,
+                                                       const std::string& expected);
   std::optional<TomlSection> section(std::string_view key);
 
   // The same, put where they belong when the key is there.

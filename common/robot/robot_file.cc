@@ -3,7 +3,6 @@
 #include "common/robot/robot_file.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -143,21 +142,18 @@ void read_body(TomlSection& top, GroundRobot& robot) {
 }
 
 void read_steering_table(TomlSection& top, RobotSteering& steering) {
-  const toml::node* node = top.find("steering_table");
-  if (node == nullptr) return;
-  bool fine = node->is_array();
-  for (std::size_t i = 0; fine && i < node->as_array()->size(); ++i) {
-    const toml::array* pair = (*node->as_array())[i].as_array();
-    const auto command =
-        pair != nullptr && pair->size() == 2 ? (*pair)[0].value<double>() : std::nullopt;
-    const auto angle = command ? (*pair)[1].value<double>() : std::nullopt;
-    fine = angle && std::isfinite(*command) && std::isfinite(*angle) &&
-           (steering.table.empty() || *command > steering.table.back().command);
-    if (fine) steering.table.push_back({*command, *angle});
+  const std::string expected =
+      "steering_table is [[command, angle in rad], ...] with two or more ascending commands";
+  const auto rows = top.rows("steering_table", 2, expected);
+  if (!rows) return;
+  steering.table = mapped(*rows, [](const auto& row) {
+    return RobotSteering::Point{row[0], row[1]};
+  });
+  const auto descends = [](const auto& a, const auto& b) { return a.command >= b.command; };
+  if (rows->size() == 1 ||
+      std::ranges::adjacent_find(steering.table, descends) != steering.table.end()) {
+    top.fail("steering_table", expected);
   }
-  if (fine && steering.table.size() != 1) return;
-  top.fail("steering_table",
-           "steering_table is [[command, angle in rad], ...] with two or more ascending commands");
 }
 
 void read_steering(TomlSection& top, GroundRobot& robot) {
