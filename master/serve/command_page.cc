@@ -17,9 +17,7 @@ namespace {
 
 std::string command_tiles(const CommandRecord& r) {
   const auto tile_of = [](const char* title, const std::string& value, const std::string& small) {
-    return fmt::format(
-        R"(<div class="tile"><dt>{}</dt><dd><strong>{}</strong><small>{}</small></dd></div>)",
-        title, value, small);
+    return html_tile(title, "", value, "", "<small>" + small + "</small>");
   };
   const bool running = r.state == "running";
   const bool simulates = r.simulated + r.remembered > 0;
