@@ -53,27 +53,29 @@ double Fitter::robust_score(const Eigen::VectorXd& z, double scale) const {
   double sum = 0;
   for (std::size_t i = 0; i < observations_.size(); ++i) {
     if (!learns_from(i, std::nullopt)) continue;
-    sum += score_of(observations_.loss, squares_of(z, static_cast<Eigen::Index>(i)), scale);
+    const double squares = squares_of(z, static_cast<Eigen::Index>(i));
+    sum += times(i) * score_of(observations_.loss, squares, scale);
   }
   return sum;
 }
 
 double Fitter::best_scale(const Eigen::VectorXd& z, std::optional<std::size_t> without_fold) const {
   const double least = observations_.least_scale, most = observations_.most_scale;
-  std::vector<double> squares;
+  std::vector<std::pair<double, double>> squares;  // and how often they count
+  double all = 0, numbers = 0;
   for (std::size_t i = 0; i < observations_.size(); ++i) {
-    if (learns_from(i, without_fold)) {
-      squares.push_back(squares_of(z, static_cast<Eigen::Index>(i)));
-    }
+    if (!learns_from(i, without_fold)) continue;
+    squares.emplace_back(squares_of(z, static_cast<Eigen::Index>(i)), times(i));
+    all += times(i) * squares.back().first;
+    numbers += 3 * times(i);
   }
   if (squares.empty() || least == most) return std::clamp(1.0, least, most);
-  const auto numbers = static_cast<double>(3 * squares.size());
   // The likelihood's own fixed point, which rises with every round (expectation, maximisation).
-  double scale = std::clamp(std::sqrt(mean(squares) / 3), least, most);
+  double scale = std::clamp(std::sqrt(all / numbers), least, most);
   for (int round = 0; round < 60; ++round) {
     double sum = 0;
-    for (const double s : squares) {
-      sum += weight(observations_.loss, s, scale) * s * scale * scale;
+    for (const auto& [s, times] : squares) {
+      sum += times * weight(observations_.loss, s, scale) * s * scale * scale;
     }
     const double next = std::clamp(std::sqrt(sum / numbers), least, most);
     const bool same = std::abs(next - scale) < 1e-4 * scale;
@@ -235,7 +237,7 @@ Normal Fitter::normal(const Fit& fit, std::optional<std::size_t> without_fold) c
   for (std::size_t i = 0; i < observations_.size(); ++i) {
     if (!learns_from(i, without_fold)) continue;
     const auto at = static_cast<Eigen::Index>(i);
-    const double w = weight(observations_.loss, squares_of(fit.z, at), fit.scale);
+    const double w = times(i) * weight(observations_.loss, squares_of(fit.z, at), fit.scale);
     const auto rows = fit.slopes.middleRows<3>(3 * at);
     normal.matrix += w * rows.transpose() * rows;
     normal.right -= w * rows.transpose() * fit.z.segment<3>(3 * at);
@@ -312,6 +314,15 @@ Fit Fitter::linear_step(const Fit& fit, std::optional<std::size_t> without_fold)
   next.u += delta;
   judge(fit.z + fit.slopes * delta, &next, without_fold);
   return next;
+}
+
+std::vector<double> Fitter::scores(const Eigen::VectorXd& z) const {
+  const double scale = best_scale(z, std::nullopt);
+  std::vector<double> all;
+  for (Eigen::Index i = 0; i < z.size() / 3; ++i) {
+    all.push_back(score_of(observations_.loss, squares_of(z, i), scale));
+  }
+  return all;
 }
 
 std::vector<double> Fitter::held_out(const Fit& fit) const {

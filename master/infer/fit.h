@@ -35,7 +35,8 @@ struct Observations {
   // Between which the scale of the noise lies, over what the whitener says.
   double least_scale = kLeastScale, most_scale = INFINITY;
   Loss loss = Loss::kStudent;
-  std::vector<bool> ignored = {};  // of which nothing is learnt; empty: none
+  std::vector<bool> ignored = {};   // of which nothing is learnt; empty: none
+  std::vector<double> weight = {};  // how often each counts; empty: once
 
   std::size_t size() const { return measured.size(); }
 };
@@ -95,6 +96,8 @@ class Fitter {
   // After the best step, by the observations of other folds alone, were predictions linear.
   // REQUIRES: slopes.
   Fit linear_step(const Fit& fit, std::optional<std::size_t> without_fold = std::nullopt) const;
+  // Log score of every observation with such residuals, under the scale that is best for them.
+  std::vector<double> scores(const Eigen::VectorXd& z) const;
   // Log score of every observation from fits to the other folds, linear steps from this one; 0 of
   // ignored ones.
   // REQUIRES: slopes.
@@ -114,6 +117,9 @@ class Fitter {
   double best_scale(const Eigen::VectorXd& z, std::optional<std::size_t> without_fold) const;
   void judge(Eigen::VectorXd z, Fit* fit,
              std::optional<std::size_t> without_fold = std::nullopt) const;
+  double times(std::size_t i) const {
+    return observations_.weight.empty() ? 1 : observations_.weight[i];
+  }
   bool learns_from(std::size_t i, std::optional<std::size_t> without_fold) const {
     if (!observations_.ignored.empty() && observations_.ignored[i]) return false;
     return !without_fold || observations_.fold[i] != *without_fold;

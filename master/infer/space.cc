@@ -41,12 +41,13 @@ Space::Space(const ParameterTable& table, std::vector<Coordinate> coordinates, O
       continue;
     }
     const Parameter& row = table[c.row];
+    const Interval within = c.within.value_or(Interval{row.lower, row.upper});
     if (c.kind == Kind::kLinear) {
-      lower_[k] = row.lower / c.size;
-      upper_[k] = row.upper / c.size;
+      lower_[k] = within.lower / c.size;
+      upper_[k] = within.upper / c.size;
     } else if (c.kind == Kind::kLogarithm) {
-      lower_[k] = std::log(least_positive(row)) / c.size;
-      upper_[k] = std::log(row.upper) / c.size;
+      lower_[k] = std::log(std::max(within.lower, least_positive(row))) / c.size;
+      upper_[k] = std::log(within.upper) / c.size;
     } else {
       const double most = c.of_ratio ? std::log(row.upper) : row.upper;
       lower_.segment<2>(k).setConstant(-most / c.size);

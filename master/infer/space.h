@@ -7,9 +7,11 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "common/base/interval.h"
 #include "common/parameters/table.h"
 #include "master/infer/predictor.h"
 
@@ -25,8 +27,9 @@ struct Coordinate {
   double symmetry = 1;            // kPolar: how often the effect looks the same in a full turn
   bool of_ratio = false;          // kPolar: the strength is the logarithm of a ratio
   double size = 1;                // of the value, or of its logarithm
-  double prior_sd = INFINITY;     // in sizes, of a prior about `centre`
-  double centre = 0;              // in sizes
+  std::optional<Interval> within = {};  // of the value; none: the row's bounds
+  double prior_sd = INFINITY;           // in sizes, of a prior about `centre`
+  double centre = 0;                    // in sizes
 
   Eigen::Index dimensions() const { return kind == Kind::kPolar ? 2 : 1; }
 };
