@@ -56,9 +56,9 @@ Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const Ru
                   start.simulations, start.starts, start.starts == 1 ? "" : "s", start.gain));
   watcher.note(fmt::format(
       "on stretches held out of the fit the simulation predicts {:.2f} nats a window {} than the "
-      "kinematics{}; no typical error there is more than {:.2f} times theirs",
+      "kinematics{}",
       std::abs(start.held_out_gain), start.held_out_gain < 0 ? "less" : "more",
-      start.kinematic ? ", too little to leave the kinematics' values" : "", start.worst_ratio));
+      start.kinematic ? ", too little to leave the kinematics' values" : ""));
   return std::optional(std::move(start));
 }
 

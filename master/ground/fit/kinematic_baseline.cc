@@ -7,6 +7,8 @@
 #include "common/base/ranges.h"
 #include "common/score/kinematic_start.h"
 #include "master/ground/fit/scans.h"
+#include "master/ground/fit/stretches.h"
+#include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
 namespace {
@@ -69,16 +71,23 @@ ParameterValues kinematic_start(const Problem& problem) {
   return fitted ? kinematic_start(problem, *fitted) : problem.values;
 }
 
-WindowEnds kinematic_held_out(const Problem& problem, const Kinematics& fitted,
-                              const RobustErrors& errors, std::span<const std::size_t> stretches) {
-  const GroundRobot& robot = problem.ground->robot();
-  const WindowSet windows = windows_of(problem);
-  const WindowFitter fitter(robot, windows);
-  const std::vector<FitRow> rows = baseline_rows(robot);
-  const WindowFit fit = fitter.hold(rows, fitted.values);
-  const NormalEquations freely{fitter.prior_precision(rows),
-                               Eigen::VectorXd::Zero(fitted.values.size())};
-  return held_out_ends(errors, fit.residuals, fitter.slopes(fit), freely, stretches);
+std::vector<Eigen::Vector3d> kinematic_held_out(const Problem& problem, const Kinematics& fitted,
+                                                const std::vector<std::size_t>& stretches) {
+  WindowSet windows = windows_of(problem);
+  windows.block.assign(stretches.begin(), stretches.end());
+  windows.blocks = 1 + std::ranges::max(windows.block);
+  const WindowFitter fitter(problem.ground->robot(), windows);
+  const std::vector<FitRow> rows = baseline_rows(problem.ground->robot());
+  std::vector<Eigen::Vector3d> ends(stretches.size());
+  for (int block = 0; block < windows.blocks; ++block) {
+    std::vector<char> out(static_cast<std::size_t>(windows.blocks));
+    out[static_cast<std::size_t>(block)] = 1;
+    const auto without = fitter.fit(rows, out, fitted.values).residuals;
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      if (windows.block[i] == block) ends[i] = without[i];
+    }
+  }
+  return ends;
 }
 
 }  // namespace gapfarm

@@ -2,12 +2,12 @@
 // beat.
 #pragma once
 
-#include <span>
+#include <Eigen/Core>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "common/score/kinematic.h"
-#include "master/ground/fit/robust_errors.h"
 
 namespace gapfarm {
 
@@ -19,8 +19,9 @@ Result<Kinematics> fit_kinematics(const Problem& problem);
 // kinematic_start() of these; the problem's own values where there is nothing to fit.
 ParameterValues kinematic_start(const Problem& problem);
 
-// held_out_ends() of fitted kinematics, whose values move as freely as the windows let them.
-WindowEnds kinematic_held_out(const Problem& problem, const Kinematics& fitted,
-                              const RobustErrors& errors, std::span<const std::size_t> stretches);
+// Of every window, measured less predicted (m, m, rad) in the predicted end's axes, by kinematics
+// fitted without the window's stretch.
+std::vector<Eigen::Vector3d> kinematic_held_out(const Problem& problem, const Kinematics& fitted,
+                                                const std::vector<std::size_t>& stretches);
 
 }  // namespace gapfarm

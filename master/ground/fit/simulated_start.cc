@@ -3,269 +3,308 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
+#include "common/math/statistics.h"
 #include "common/score/kinematic_start.h"
 #include "master/ground/fit/kinematic_baseline.h"
-#include "master/ground/fit/simulation_fit.h"
+#include "master/ground/fit/stretches.h"
+#include "master/infer/compete.h"
+#include "master/infer/fit.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr int kMostRounds = 24;
-constexpr int kRaceRounds = 3;  // of every start, before the best go on
+using infer::Coordinate;
+using infer::Fit;
+using infer::Fitter;
+using infer::Space;
+using Ends = std::vector<Eigen::Vector3d>;  // measured less predicted: m, m, rad
+
+constexpr double kUnit = 0.05;          // of a gene's range: of a coordinate
+constexpr double kFreelyMoves = 0.3;    // of a gene's range, where the windows do not show
+constexpr std::size_t kStretches = 6;   // held out in turn
+constexpr std::size_t kParts = 12;      // of the log, that show how sure a gain is
+constexpr std::size_t kLooks = 3;       // starts a gene that kinematics do not show
+constexpr std::size_t kBestClimbs = 2;  // of all starts, to the end
+constexpr int kRaceSteps = 4, kClimbSteps = 40;
+constexpr double kHeadingCounts = 2;  // as much as each direction of a position
+constexpr double kLeastScale = 1e-5;  // m or rad
 // What windows of one run show is less than their number says: how much more than one of them a
 // value's start counts is tried on stretches that were held out.
 constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
-constexpr int kSharpenings = 4;
-constexpr double kFirmly = 1000;   // held where nothing slips
-constexpr double kWorseCosts = 1;  // nats a window for errors e times as large
-// Position and heading count alike, and what is worse than the kinematics' more.
-constexpr double kHeadingCounts = 2;
-constexpr int kEmphases = 3;
-constexpr double kEmphasis = 4;  // power of the ratio
-constexpr double kMostLogRatio = 0.26;
-constexpr double kAsGood = 1.02;   // a ratio that is not worth climbing for
-constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not show
 // What is left to find is mostly the noise: a search that has the windows' whole spread to roam in
 // trades ends for the noise's likelihood.
 constexpr double kFoundSpread = 0.1;  // of what the windows leave unsure
 constexpr double kHeldSpread = 1e-3;
 
-double emphasis_of(const Unsure& log_ratio) {
-  return std::exp(kEmphasis * std::clamp(log_ratio.value, 0.0, kMostLogRatio));
+double total_of(const std::vector<double>& of) {
+  return std::accumulate(of.begin(), of.end(), 0.0);
 }
 
-}  // namespace
+class SimulationFit {
+ public:
+  SimulationFit(Farm& farm, const Problem& problem);
+  Result<SimulatedStart> run(double widest);
 
-// What kinematics show is moved to suit the rest, by the slopes of the first climb.
-Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
-                             const Climb& first) {
-  std::vector<Genome> genomes;
-  std::vector<std::size_t> whose;
-  std::vector<Hold> held;
-  for (std::size_t k = 0; k < looks->size(); ++k) {
-    const std::optional<At>& look = (*looks)[k];
-    if (!look) continue;
-    NormalEquations equations = equations_at(*look, holds[k], first.slopes);
-    for (std::size_t j = 0; j < fitted_rows_.size(); ++j) {
-      if (!contains(untold_, fitted_rows_[j])) continue;
-      const auto row = static_cast<Eigen::Index>(j);
-      equations.H.row(row).setZero();
-      equations.H.col(row).setZero();
-      equations.H(row, row) = 1;
-      equations.g[row] = 0;
-    }
-    genomes.push_back(moved(*look, equations));
-    whose.push_back(k);
-    held.push_back(holds[k]);
+ private:
+  // A fit, and the space that it was made in.
+  struct Climb {
+    Space space;
+    Fit fit;
+  };
+
+  // The first `kept` whatever they score, and the best of the others.
+  static void keep_best(std::size_t count, std::ptrdiff_t kept, std::vector<Climb>* climbs) {
+    std::stable_sort(climbs->begin() + kept, climbs->end(),
+                     [](const Climb& a, const Climb& b) { return a.fit.score > b.fit.score; });
+    if (climbs->size() > count)
+      climbs->erase(climbs->begin() + static_cast<std::ptrdiff_t>(count), climbs->end());
   }
-  ASSIGN_OR_RETURN(auto settled, look_at(genomes, held));
-  for (std::size_t j = 0; j < whose.size(); ++j) {
-    std::optional<At>& look = (*looks)[whose[j]];
-    if (settled[j] && settled[j]->nats > look->nats) look = std::move(settled[j]);
+
+  Fitter fitter(const Space& space) const { return Fitter(forward_, observed_, space); }
+  Coordinate coordinate(std::size_t gene, const Overrides& centre) const;
+  Space space(const std::vector<std::size_t>& genes, const Overrides& start) const;
+  Overrides start_of(const Genome& genome) const;
+  Genome genome_at(const Climb& climb) const;
+  void observe(const Kinematics& kinematics);
+  Eigen::VectorXd whitened(const Ends& ends) const;
+  Result<std::vector<Climb>> climbs(const Genome& start, const Genome& firm);
+  Status follow(Climb* climb, int steps) const;
+  // Weighted nats of the parts of the log, of stretches that were held out.
+  std::vector<double> by_parts(const std::vector<double>& scores) const;
+  Result<std::vector<double>> held_out(const Climb& climb) const;
+  double hold_best(Climb* climb) const;
+  Status judge(const Climb& best, const Genome& start, const Genome& firm, SimulatedStart* found);
+  void take_spread(const Climb& climb, double widest, SimulatedStart* found) const;
+
+  const Problem& problem_;
+  Predictor predictor_;
+  infer::Forward forward_;
+  std::size_t simulations_ = 0;
+  infer::Observations observed_;
+  Ends kinematic_ends_, baseline_;   // of the kinematics: fitted to all, and held out
+  std::vector<std::size_t> fitted_;  // genes that move ends
+  // Of them, those that kinematics have a word for, and the others.
+  std::vector<std::size_t> kinematic_, dynamic_;
+  std::vector<std::size_t> parts_;  // of each window
+};
+
+SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
+    : problem_(problem),
+      predictor_(farm, problem),
+      forward_([this](const auto& points) {
+        simulations_ += points.size();
+        return predictor_.attempt(points);
+      }),
+      parts_(held_out_stretches(problem.log.trials, problem.runs, kParts)) {
+  const std::vector<bool> kinematic = identified_by_kinematics(problem);
+  for (std::size_t g = 0; g < problem.genes.size(); ++g) {
+    const Parameter& row = problem.table()[problem.genes[g].row];
+    const bool noise = row.key.find("_noise_") != std::string::npos;
+    if (noise || row.kind != ParameterKind::kReal) continue;
+    fitted_.push_back(g);
+    (kinematic[g] ? kinematic_ : dynamic_).push_back(g);
   }
-  return {};
 }
 
-Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
-  std::vector<Climb> climbs;
-  if (untold_.size() < 2 || first.slopes.empty()) return climbs;
-  const auto starts = spread_starts(start_, untold_, kLooks * untold_.size());
-  std::vector<Hold> holds = mapped(starts, [](const Genome& start) { return Hold{start, 1}; });
-  ASSIGN_OR_RETURN(auto looks, look_at(starts, holds));
-  for (int round = 0; round < 2; ++round) {
-    RETURN_IF_ERROR(settle(&looks, holds, first));
-  }
-  for (std::size_t k = 0; k < looks.size(); ++k) {
-    std::optional<At>& look = looks[k];
-    if (look) climbs.push_back({std::move(*look), holds[k]});
-  }
-  std::stable_sort(climbs.begin(), climbs.end(),
-                   [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; });
-  climbs.resize(std::min(climbs.size(), untold_.size() / 2));
-  return climbs;
+Coordinate SimulationFit::coordinate(std::size_t g, const Overrides& centre) const {
+  const Gene& gene = problem_.genes[g];
+  const bool log = gene.scale == ParameterScale::kLog;
+  const auto of = [log](double value) { return log ? std::log(value) : value; };
+  Coordinate c;
+  c.kind = log ? Coordinate::Kind::kLogarithm : Coordinate::Kind::kLinear;
+  c.row = gene.row;
+  c.size = kUnit * (of(gene.upper) - of(gene.lower));
+  c.within = Interval{gene.lower, gene.upper};
+  c.prior_sd = kFreelyMoves / kUnit;
+  c.centre = of(centre.at(gene.row)) / c.size;
+  return c;
 }
 
-WindowEnds SimulationFit::held_out(const Climb& climb, const Hold& hold) const {
-  return held_out_ends(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome, hold),
-                       stretches_);
+// Genes that are none of these stand where they start.
+Space SimulationFit::space(const std::vector<std::size_t>& genes, const Overrides& start) const {
+  return Space(problem_.table(), mapped(genes, [&](std::size_t g) { return coordinate(g, start); }))
+      .holding(start);
 }
 
-// The same by simulations at the values of every step: where contacts begin to slip the first order
-// promises what is not to be had.
-Result<WindowEnds> SimulationFit::simulated_held_out(const Climb& climb) {
-  const auto steps = held_out_steps(*errors_, climb.at.ends, climb.slopes,
-                                    prior_at(climb.at.genome, climb.hold), stretches_);
-  std::vector<Genome> genomes;
-  for (const Eigen::VectorXd& step : steps) {
-    genomes.push_back(with_fitted_values(climb.at.genome, fitted_values(climb.at.genome) - step));
+Overrides SimulationFit::start_of(const Genome& genome) const {
+  Overrides at;
+  for (const std::size_t g : fitted_) {
+    const Gene& gene = problem_.genes[g];
+    at[gene.row] = decode_gene(problem_.table(), gene, genome[g]);
   }
-  ASSIGN_OR_RETURN(const auto there, look_at(genomes, {climb.hold}));
-  WindowEnds ends = held_out(climb, climb.hold);
+  return at;
+}
+
+Genome SimulationFit::genome_at(const Climb& climb) const {
+  const Overrides at = climb.space.values(climb.fit.u);
+  return mapped(problem_.genes, [&](const Gene& gene) {
+    return encode_gene(problem_.table(), gene, value_at(problem_, at, gene.row));
+  });
+}
+
+// Windows, each length scaled by what the kinematics leave of it.
+void SimulationFit::observe(const Kinematics& kinematics) {
+  const std::vector<Trial>& trials = problem_.log.trials;
+  const std::vector<Pose> ends = kinematic_ends(problem_, kinematics);
+  const auto lengths = window_lengths(mapped(trials, [](const Trial& t) { return *t.duration_s; }));
+  std::vector<std::array<std::vector<double>, 2>> sizes(1 + std::ranges::max(lengths));
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    kinematic_ends_.push_back(local_difference(ends[i], trials[i].X_WE));
+    sizes[lengths[i]][0].push_back(kinematic_ends_[i].head<2>().norm() / std::sqrt(2.0));
+    sizes[lengths[i]][1].push_back(std::abs(kinematic_ends_[i][2]));
+  }
+  observed_.measured = mapped(trials, &Trial::X_WE);
+  observed_.weight = window_weights(lengths);
+  observed_.fold = held_out_stretches(trials, problem_.runs, kStretches);
+  observed_.least_scale = 1e-3;
+  for (const std::size_t length : lengths) {
+    const auto scale = [&](int part) {
+      return std::max(1.3 * median(sizes[length][static_cast<std::size_t>(part)]), kLeastScale);
+    };
+    const Eigen::Vector3d scales(scale(0), scale(0), scale(1) / std::sqrt(kHeadingCounts));
+    observed_.whitener.emplace_back(scales.cwiseInverse().asDiagonal());
+  }
+  baseline_ = kinematic_held_out(problem_, kinematics, observed_.fold);
+}
+
+Eigen::VectorXd SimulationFit::whitened(const Ends& ends) const {
+  Eigen::VectorXd z(static_cast<Eigen::Index>(3 * ends.size()));
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    const std::optional<At>& at = there[stretches_[i]];
-    if (at) ends[i] = at->ends[i];
+    z.segment<3>(static_cast<Eigen::Index>(3 * i)) = observed_.whitener[i] * ends[i];
   }
-  return ends;
+  return z;
 }
 
-// What is better must be so significantly: a standard error is taken off every gain.
-SimulationFit::Predicted SimulationFit::predicted(const WindowEnds& ends) const {
-  const Unsure gain = plain_->gain(ends, baseline_, parts_);
-  Predicted of{gain.value, 0, gain.error - gain.value};
-  for (const auto& ratios : plain_->log_ratios(ends, baseline_, parts_)) {
-    for (const Unsure& ratio : ratios) {
-      of.worst = std::max(of.worst, std::exp(ratio.value));
-      of.cost += kWorseCosts * std::max(ratio.value + ratio.error, 0.0);
+// From the kinematics' values first; no others where that cannot be simulated.
+Result<std::vector<SimulationFit::Climb>> SimulationFit::climbs(const Genome& start,
+                                                                const Genome& firm) {
+  std::vector<Genome> from = {start};
+  if (dynamic_.size() >= 2) {
+    for (Genome& g : spread_starts(start, dynamic_, kLooks * dynamic_.size())) {
+      from.push_back(std::move(g));
     }
   }
-  return of;
+  std::vector<Space> spaces =
+      mapped(from, [&](const Genome& g) { return space(fitted_, start_of(g)); });
+  std::vector<Eigen::VectorXd> points;
+  for (std::size_t k = 0; k < from.size(); ++k) points.push_back(spaces[k].from(start_of(from[k])));
+  ASSIGN_OR_RETURN(const auto fits, fitter(spaces.front()).starts(points, spaces));
+  std::vector<Climb> all;
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    if (!std::isfinite(fits[k].score)) continue;
+    all.push_back({spaces[k], fitter(spaces[k]).known(points[k], fits[k].z)});
+  }
+  const Space grips = space(kinematic_, start_of(firm));
+  ASSIGN_OR_RETURN(auto fit, fitter(grips).start(grips.from(start_of(firm))));
+  all.push_back({grips, std::move(fit)});
+  if (!std::isfinite(fits.front().score)) all.clear();
+  return all;
 }
 
-// From where the climb stands, with another hold or other errors.
-Status SimulationFit::climb_again(Climb* climb) {
-  climb->at.nats = errors_->nats(climb->at.ends) - cost_of(climb->at.genome, climb->hold);
-  climb->over = false;
-  return climb_on(climb, kMostRounds);
+Status SimulationFit::follow(Climb* climb, int steps) const {
+  const Fitter fits = fitter(climb->space);
+  RETURN_IF_ERROR(fits.improve(&climb->fit, steps));
+  if (climb->fit.fresh || !std::isfinite(climb->fit.score)) return {};
+  return fits.differentiate(&climb->fit);
 }
 
-// What stands on the kinematics' values and hardly slips.
-Result<std::optional<Climb>> SimulationFit::firm_climb() {
-  if (firm_ == start_ && untold_.empty()) return std::optional<Climb>();
-  const Hold hold{firm_, 1, kFirmly};
-  ASSIGN_OR_RETURN(auto look, look_at({firm_}, {hold}));
-  if (!look.front()) return std::optional<Climb>();
-  Climb climb{*std::move(look.front()), hold};
-  RETURN_IF_ERROR(climb_on(&climb, kMostRounds));
-  return std::optional(std::move(climb));
+std::vector<double> SimulationFit::by_parts(const std::vector<double>& scores) const {
+  std::vector<double> sums(1 + std::ranges::max(parts_));
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    sums[parts_[i]] += observed_.weight[i] * scores[i] / static_cast<double>(scores.size());
+  }
+  return sums;
 }
 
-// What predicts stretches that were held out best, held as firmly as is best for these.
-Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
-  const auto by_nats = [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; };
-  for (Climb& climb : climbs) {
-    RETURN_IF_ERROR(climb_on(&climb, kRaceRounds));
+// By simulations at the values that fit the other stretches: where contacts begin to slip the first
+// order promises what is not to be had.
+Result<std::vector<double>> SimulationFit::held_out(const Climb& climb) const {
+  const Fitter fits = fitter(climb.space);
+  std::vector<Eigen::VectorXd> points;
+  for (std::size_t f = 0; f <= std::ranges::max(observed_.fold); ++f) {
+    points.push_back(fits.linear_step(climb.fit, f).u);
   }
-  std::erase_if(climbs, [](const Climb& climb) { return climb.slopes.empty(); });
-  std::stable_sort(climbs.begin(), climbs.end(), by_nats);
-  if (climbs.size() > 2) climbs.resize(2);
-  for (Climb& climb : climbs) {
-    RETURN_IF_ERROR(climb_on(&climb, kMostRounds));
+  ASSIGN_OR_RETURN(const auto there,
+                   fits.starts(points, std::vector<Space>(points.size(), climb.space)));
+  Eigen::VectorXd z = climb.fit.z;
+  for (std::size_t i = 0; i < observed_.size(); ++i) {
+    const Fit& of = there[observed_.fold[i]];
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    if (of.z.size() > 0) z.segment<3>(at) = of.z.segment<3>(at);
   }
-  ASSIGN_OR_RETURN(auto firm, firm_climb());
-  if (firm) climbs.push_back(*std::move(firm));
-  std::size_t best = 0;
-  Hold held = climbs.front().hold;
-  double least = INFINITY;
-  for (std::size_t k = 0; k < climbs.size(); ++k) {
-    if (climbs[k].slopes.empty()) continue;
-    double cost = INFINITY;
-    const Hold hold = best_hold(climbs[k], &cost);
-    if (!(cost < least)) continue;
-    best = k;
-    held = hold;
-    least = cost;
-  }
-  Climb chosen = std::move(climbs[best]);
-  if (held.strength != chosen.hold.strength) {
-    chosen.hold = held;
-    RETURN_IF_ERROR(climb_again(&chosen));
-  }
-  ASSIGN_OR_RETURN(auto sharp, sharpen(std::move(chosen)));
-  return weigh_worse(std::move(sharp));
+  return by_parts(fits.scores(z));
 }
 
-// As firmly as predicts best what was held out; `cost` is that of it.
-Hold SimulationFit::best_hold(const Climb& climb, double* cost) const {
-  Hold best = climb.hold;
-  *cost = INFINITY;
-  for (const double strength : kHolds) {
-    const Hold hold{climb.hold.start, strength, climb.hold.untold};
-    const double own = predicted(held_out(climb, hold)).cost;
-    if (!(own < *cost)) continue;
-    best = hold;
-    *cost = own;
+// Held to where it began as firmly as predicts best what was held out; the nats of that.
+double SimulationFit::hold_best(Climb* climb) const {
+  const std::vector<Coordinate> begun = climb->space.all();
+  double most = -INFINITY;
+  for (const double hold : kHolds) {
+    const Space held = climb->space.only(mapped(begun, [&](Coordinate c) {
+      c.prior_sd /= std::sqrt(hold);
+      return c;
+    }));
+    const double nats = total_of(by_parts(fitter(held).held_out(climb->fit)));
+    if (!(nats > most)) continue;
+    most = nats;
+    climb->space = held;
   }
-  return best;
+  climb->fit.score = fitter(climb->space).known(climb->fit.u, climb->fit.z).score;
+  climb->fit.settled = false;
+  return most;
 }
 
-// Kinematics that leave much more than the simulation are no measure of which windows lie far off.
-Result<Climb> SimulationFit::sharpen(Climb best) {
-  for (int round = 0; round < kSharpenings && !best.slopes.empty(); ++round) {
-    const WindowEnds ends = held_out(best, best.hold);
-    if (!plain_->sharpen(ends)) break;
-    errors_->sharpen(ends);
-    Climb next = best;
-    RETURN_IF_ERROR(climb_again(&next));
-    double cost = INFINITY;
-    next.hold = best_hold(next, &cost);
-    RETURN_IF_ERROR(climb_again(&next));
-    const double before = predicted(held_out(best, best.hold)).cost;
-    if (!(predicted(held_out(next, next.hold)).cost < before)) break;
-    best = std::move(next);
-  }
-  return best;
-}
-
-// What is predicted worse than by the kinematics counts more, as long as that helps.
-Result<Climb> SimulationFit::weigh_worse(Climb best) {
-  for (int round = 0; round < kEmphases && !best.slopes.empty(); ++round) {
-    const WindowEnds ends = held_out(best, best.hold);
-    if (predicted(ends).worst <= kAsGood) break;
-    std::vector<std::array<double, 2>> factors;
-    for (const auto& [position, heading] : plain_->log_ratios(ends, baseline_, parts_)) {
-      factors.push_back({emphasis_of(position), emphasis_of(heading)});
+// Against the kinematics, whose values in the simulation are `start` or, without slip, `firm`.
+Status SimulationFit::judge(const Climb& best, const Genome& start, const Genome& firm,
+                            SimulatedStart* found) {
+  ASSIGN_OR_RETURN(const auto own, held_out(best));
+  const Fitter fits = fitter(best.space);
+  const auto theirs = by_parts(fits.scores(whitened(baseline_)));
+  const infer::PairedGain gain = infer::paired_gain(own, theirs);
+  found->held_out_gain = gain.sum;
+  found->genome = genome_at(best);
+  double most = gain.sum - gain.se;
+  const std::array<const Genome*, 2> kinematic = {&start, &firm};
+  for (const Genome* genome : kinematic) {
+    const Space at = space({}, start_of(*genome));
+    ASSIGN_OR_RETURN(const Fit there, fitter(at).start(Eigen::VectorXd(0)));
+    if (!std::isfinite(there.score)) continue;
+    if (genome == &start) {
+      found->gain = (fits.known(best.fit.u, best.fit.z).score - there.score) /
+                    static_cast<double>(observed_.size());
     }
-    errors_->emphasise(factors);
-    Climb next = best;
-    RETURN_IF_ERROR(climb_again(&next));
-    if (predicted(held_out(next, next.hold)).cost >= predicted(ends).cost) break;
-    best = std::move(next);
-  }
-  return best;
-}
-
-// Against the kinematics, whose values in the simulation are `begin` or, without slip, stand firm.
-Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) {
-  ASSIGN_OR_RETURN(const auto met, simulated_held_out(best));
-  const Predicted own = predicted(met);
-  found->held_out_gain = own.gain;
-  found->worst_ratio = own.worst;
-  const WindowEnds ends = window_errors(problem_, kinematic_ends(problem_, kinematics_));
-  ASSIGN_OR_RETURN(auto firm, look_at({firm_}, {Hold{firm_}}));
-  double least = own.cost;
-  for (const At& at : {begin, firm.front().value_or(begin)}) {
     // What the simulation makes of the kinematics' values is nearly what they make of them.
-    WindowEnds predicts = baseline_;
-    for (std::size_t i = 0; i < ends.size(); ++i) predicts[i] += at.ends[i] - ends[i];
-    const Predicted theirs = predicted(predicts);
-    if (theirs.cost >= least) continue;
-    least = theirs.cost;
+    const Eigen::VectorXd z = whitened(baseline_) + there.z - whitened(kinematic_ends_);
+    const infer::PairedGain kept = infer::paired_gain(by_parts(fits.scores(z)), theirs);
+    if (kept.sum - kept.se <= most) continue;
+    most = kept.sum - kept.se;
     found->kinematic = true;
-    found->genome = at.genome;
-    found->worst_ratio = theirs.worst;
+    found->genome = *genome;
   }
-  if (found->kinematic) return {};
-  found->genome = best.at.genome;
-  found->gain = (plain_->nats(best.at.ends) - plain_->nats(begin.ends)) /
-                static_cast<double>(plain_->windows());
+  if (found->kinematic) found->gain = 0;
   return {};
 }
 
 void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStart* found) const {
-  const auto n = static_cast<Eigen::Index>(start_.size());
+  const auto n = static_cast<Eigen::Index>(problem_.genes.size());
   Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(n, n) / (widest * widest);
-  for (std::size_t j = 0; j < fitted_rows_.size(); ++j) {
-    for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
-      precision(fitted_rows_[j], fitted_rows_[k]) +=
-          climb.equations.H(j, k) / (kFoundSpread * kFoundSpread);
+  const Eigen::MatrixXd known = fitter(climb.space).normal(climb.fit).matrix;
+  const std::vector<std::size_t>& genes =
+      climb.space.coordinates() == fitted_.size() ? fitted_ : kinematic_;
+  const double unit = kUnit * kFoundSpread;
+  for (std::size_t j = 0; j < genes.size(); ++j) {
+    for (std::size_t k = 0; k < genes.size(); ++k) {
+      precision(genes[j], genes[k]) += known(j, k) / (unit * unit);
     }
-    if (!found->kinematic) continue;
-    const auto own = static_cast<Eigen::Index>(fitted_rows_[j]);
-    precision(own, own) += 1 / (kHeldSpread * kHeldSpread);
+  }
+  for (const std::size_t g : fitted_) {
+    const bool held = found->kinematic || !contains(genes, g);
+    if (held) precision(g, g) += 1 / (kHeldSpread * kHeldSpread);
   }
   const Eigen::MatrixXd spread = inverse_of_symmetric(precision);
   found->spread.assign(spread.data(), spread.data() + spread.size());
@@ -273,39 +312,47 @@ void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStar
 
 Result<SimulatedStart> SimulationFit::run(double widest) {
   ASSIGN_OR_RETURN(const auto kinematics, fit_kinematics(problem_));
-  kinematics_ = kinematics;
-  std::vector<double> durations_s;
-  for (const Trial& trial : problem_.log.trials) durations_s.push_back(*trial.duration_s);
-  plain_.emplace(durations_s, window_errors(problem_, kinematic_ends(problem_, kinematics_)));
-  errors_ = plain_;
-  errors_->emphasise(std::vector<std::array<double, 2>>(errors_->lengths(), {1, kHeadingCounts}));
-  baseline_ = kinematic_held_out(problem_, kinematics_, *plain_, stretches_);
-  const ParameterValues values = kinematic_start(problem_, kinematics_);
+  observe(kinematics);
+  const ParameterValues values = kinematic_start(problem_, kinematics);
   const ParameterValues grip = without_slip(problem_, values);
-  for (const Gene& gene : problem_.genes) {
-    start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
-    firm_.push_back(encode_gene(problem_.table(), gene, grip[gene.row]));
-  }
-  const Hold hold{start_, 1};
-  ASSIGN_OR_RETURN(auto first, look_at({start_}, {hold}));
+  const auto genome_of = [&](const ParameterValues& of) {
+    return mapped(problem_.genes, [&](const Gene& gene) {
+      return encode_gene(problem_.table(), gene, of[gene.row]);
+    });
+  };
+  const Genome start = genome_of(values), firm = genome_of(grip);
   SimulatedStart found;
-  found.genome = start_;
+  found.genome = start;
+  if (fitted_.empty()) return found;
+  ASSIGN_OR_RETURN(auto all, climbs(start, firm));
   found.simulations = simulations_;
-  if (!first.front() || fitted_rows_.empty()) return found;
-  const At begin = *first.front();
-  std::vector<Climb> climbs = {{begin, hold}};
-  RETURN_IF_ERROR(step(&climbs.front()));
+  if (all.empty()) return found;
+  found.starts = all.size();
+  Climb grips = std::move(all.back());
+  all.pop_back();
+  keep_best(1 + std::max<std::size_t>(dynamic_.size() / 2, 1), 1, &all);
+  for (Climb& climb : all) RETURN_IF_ERROR(follow(&climb, kRaceSteps));
+  keep_best(kBestClimbs, 0, &all);
+  all.push_back(std::move(grips));
+  std::optional<Climb> best;
+  double most = -INFINITY;
+  for (Climb& climb : all) {
+    RETURN_IF_ERROR(follow(&climb, kClimbSteps));
+    if (climb.fit.slopes.size() == 0) continue;
+    const double nats = hold_best(&climb);
+    if (!(nats > most)) continue;
+    most = nats;
+    best = climb;
+  }
+  if (!best) return found;
+  RETURN_IF_ERROR(follow(&*best, kClimbSteps));
+  RETURN_IF_ERROR(judge(*best, start, firm, &found));
   found.simulations = simulations_;
-  if (climbs.front().slopes.empty()) return found;
-  ASSIGN_OR_RETURN(auto others, other_climbs(climbs.front()));
-  for (Climb& climb : others) climbs.push_back(std::move(climb));
-  found.starts = climbs.size();
-  ASSIGN_OR_RETURN(const auto best, best_of(std::move(climbs)));
-  RETURN_IF_ERROR(judge(best, begin, &found));
-  found.simulations = simulations_;
-  take_spread(best, widest, &found);
+  take_spread(*best, widest, &found);
   return found;
 }
+
+}  // namespace
 
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest) {
   return SimulationFit(farm, problem).run(widest);

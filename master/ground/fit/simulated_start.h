@@ -20,8 +20,6 @@ struct SimulatedStart {
   double gain = 0;         // nats a window, over the kinematics' values in the simulation
   // On stretches that were held out of the fits, nats a window over the robot's own kinematics.
   double held_out_gain = 0;
-  // The largest of the ratios of errors' middles there, of position and heading at each length.
-  double worst_ratio = 1;
   // The kinematics predicted those better, and the values are theirs.
   bool kinematic = false;
 };
@@ -31,19 +29,14 @@ struct SimulatedStart {
 std::vector<Genome> spread_starts(const Genome& middle, std::span<const std::size_t> free,
                                   std::size_t count);
 
-// Gauss and Newton's steps to the most likely ends of the problem's windows (RobustErrors, scaled
-// by what the kinematics leave; heading counts as much as position), each with the slopes of the
-// one before, corrected by what that did (Broyden), for as long as these lead on; from the values
-// of the robot's own kinematics (kinematic_start()) and from some others in what kinematics have no
-// word for, such as friction and creep, where a way from the first ends on a hill beside the
-// highest.  The few best after a look go on, the best two of these to the end, and beside them one
-// that hardly slips. What predicts stretches that were held out best is taken, where errors that
-// may be larger than the kinematics' cost; where much less is left than by the kinematics, windows
-// are scaled by that from then on, so that outliers count little; what is larger than theirs
-// then counts more, as long as that helps.  The kinematics' own values are kept where they do
-// better, with the search held near these.  The spread is at most `widest` (a standard deviation in
-// gene units) where the windows do not show. Where a simulation does not end well nothing moves.
-// Errors: those of the farm. REQUIRES: a problem with a ground robot and windows.
+// Robust fits (infer::Fitter) of the genes that move ends to the problem's windows, scaled by what
+// the kinematics leave: from the values of the robot's own kinematics (kinematic_start()), from the
+// same with wheels that hardly slip, and from some others in what kinematics have no word for, such
+// as friction and creep, where a way from the first ends on a hill beside the highest.  What
+// predicts stretches that were held out best is taken, held to where it began as firmly as is best
+// for these; the kinematics' own values where no fit does better, with the search held near these.
+// The spread is at most `widest` (a standard deviation in gene units) where the windows do not
+// show. Errors: those of the farm.  REQUIRES: a problem with a ground robot and windows.
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest);
 
 }  // namespace gapfarm
