@@ -35,8 +35,8 @@ struct Observations {
   // Between which the scale of the noise lies, over what the whitener says.
   double least_scale = kLeastScale, most_scale = INFINITY;
   Loss loss = Loss::kStudent;
-  std::vector<bool> ignored = {};   // of which nothing is learnt; empty: none
-  std::vector<double> weight = {};  // how often each counts; empty: once
+  // How often each counts; 0: nothing is learnt from it.  Empty: once.
+  std::vector<double> weight = {};
 
   std::size_t size() const { return measured.size(); }
 };
@@ -99,7 +99,7 @@ class Fitter {
   // Log score of every observation with such residuals, under the scale that is best for them.
   std::vector<double> scores(const Eigen::VectorXd& z) const;
   // Log score of every observation from fits to the other folds, linear steps from this one; 0 of
-  // ignored ones.
+  // those without weight.
   // REQUIRES: slopes.
   std::vector<double> held_out(const Fit& fit) const;
 
@@ -121,8 +121,7 @@ class Fitter {
     return observations_.weight.empty() ? 1 : observations_.weight[i];
   }
   bool learns_from(std::size_t i, std::optional<std::size_t> without_fold) const {
-    if (!observations_.ignored.empty() && observations_.ignored[i]) return false;
-    return !without_fold || observations_.fold[i] != *without_fold;
+    return times(i) > 0 && (!without_fold || observations_.fold[i] != *without_fold);
   }
   Status move_each(const Forward& forward, const Eigen::VectorXd& from, double share,
                    std::vector<Eigen::Index>* open, Fit* fit) const;

@@ -26,7 +26,7 @@ Scope scope_of(const Forward& forward, const Observations& whole,
     some.observations.measured.push_back(whole.measured[i]);
     some.observations.whitener.push_back(whole.whitener[i]);
     some.observations.fold.push_back(whole.fold[i]);
-    if (!whole.ignored.empty()) some.observations.ignored.push_back(whole.ignored[i]);
+    if (!whole.weight.empty()) some.observations.weight.push_back(whole.weight[i]);
     if (columns == 0) continue;
     some.observations.columns.middleRows<3>(3 * k) = whole.columns.middleRows<3>(3 * i);
   }

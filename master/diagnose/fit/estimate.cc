@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/slopes.h"
@@ -118,7 +119,7 @@ infer::Observations observations_of(const Study& study, const Eigen::MatrixXd& n
   all.columns = nuisances;
   all.least_scale = all.most_scale = 1;
   all.loss = loss;
-  all.ignored = study.ignored;
+  all.weight = mapped(study.ignored, [](bool ignored) { return ignored ? 0.0 : 1.0; });
   return all;
 }
 

@@ -200,13 +200,13 @@ TEST(InferFit, FindsTheValueDespiteOutliers) {
 }
 
 // Wherever they lie, in the fit, its score and what is held out.
-TEST(InferFit, IgnoredObservationsTeachNothing) {
+TEST(InferFit, ObservationsWithoutWeightTeachNothing) {
   const Forward f = forward();
   Observations o = observed({{row("finger_friction"), 0.6}});
-  o.ignored.assign(kObservations, false);
+  o.weight.assign(kObservations, 2);
   const auto fitted = [&](double away) {
     for (std::size_t i = 0; i < kObservations; i += 3) {
-      o.ignored[i] = true;
+      o.weight[i] = 0;
       o.measured[i].x += away;
     }
     return base_of(f, o);
