@@ -222,7 +222,7 @@ std::vector<double> SimulationFit::by_parts(const std::vector<double>& scores) c
 }
 
 // By simulations at the values that fit the other stretches: where contacts begin to slip the first
-// order promises what is not to be had.
+// order promises too much.
 Result<std::vector<double>> SimulationFit::held_out(const Climb& climb) const {
   const Fitter fits = fitter(climb.space);
   std::vector<Eigen::VectorXd> points;
