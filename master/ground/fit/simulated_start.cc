@@ -262,6 +262,10 @@ double SimulationFit::hold_best(Climb* climb) const {
 // Against the kinematics, whose values in the simulation are `start` or, without slip, `firm`.
 Status SimulationFit::judge(const Climb& best, const Genome& start, const Genome& firm,
                             SimulatedStart* found) {
+  // Of one stretch nothing can be held out, and no fit to it shows what it predicts.
+  const auto& folds = observed_.fold;
+  found->kinematic = std::ranges::count(folds, folds.front()) == std::ssize(folds);
+  if (found->kinematic) return {};
   ASSIGN_OR_RETURN(const auto own, held_out(best));
   const Fitter fits = fitter(best.space);
   const auto theirs = by_parts(fits.scores(whitened(baseline_)));

@@ -20,7 +20,7 @@ struct SimulatedStart {
   double gain = 0;         // nats a window, over the kinematics' values in the simulation
   // On stretches that were held out of the fits, nats a window over the robot's own kinematics.
   double held_out_gain = 0;
-  // The kinematics predicted those better, and the values are theirs.
+  // The kinematics predicted those better, or nothing could be held out, and the values are theirs.
   bool kinematic = false;
 };
 

@@ -89,6 +89,22 @@ TEST(SimulatedStart, OtherStartsAreSpreadOverWhatIsFree) {
   EXPECT_GT(most[3] - least[3], 0.45);
 }
 
+// A robot of which a pose at either end of one run was measured: a fit to that is no prediction.
+TEST(SimulatedStart, KeepsTheKinematicsWhereNothingCanBeHeldOut) {
+  Problem problem = tests::ground_problem();
+  ParameterValues truth = problem.values;
+  truth[problem.table().row("friction_ratio")] = 1.25;
+  for (const char* key : {"wheels.left.radius", "friction_ratio"}) search_for(&problem, key);
+  tests::take_runs(problem, {tests::driven_run(problem, truth, 3)}, {{2}, 0.5});
+  ASSERT_EQ(problem.log.trials.size(), 1u);
+  tests::WorkerFarm farm;
+  const auto start = fit_by_simulation(farm, problem, 0.1);
+  ASSERT_TRUE(start.ok()) << start.error().message;
+  EXPECT_TRUE(start->kinematic);
+  EXPECT_EQ(start->held_out_gain, 0);
+  EXPECT_LT(start->spread.front(), 1e-5);  // held near them
+}
+
 TEST(SimulatedStart, StandsWhereNothingMovesAnEnd) {
   Problem problem = tests::ground_problem();
   search_for(&problem, kGroundTurnNoise);
