@@ -34,7 +34,9 @@ Result<std::string> read_text_file(const std::string& path) {
     return Error{path + ": no such file; check the path (it is taken from the current folder)"};
   }
   if (std::filesystem::is_directory(status)) {
-    return Error{path + ": is a folder, expected a file; name the files in it"};
+    const std::filesystem::path model = std::filesystem::path(path) / "model.toml";
+    return Error{path + ": is a folder, expected a file; name " +
+                 (std::filesystem::exists(model, code) ? model.string() : "the files in it")};
   }
   std::ifstream in(path, std::ios::binary);
   std::ostringstream bytes;

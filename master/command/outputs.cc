@@ -33,6 +33,7 @@ constexpr Marker kMarkers[] = {
     {FolderKind::kDiagnosis, "simulations.sqlite", "a diagnosis"},
     {FolderKind::kDiagnosis, "diagnosis.json", "a diagnosis"},
     {FolderKind::kBlindCheck, "seals.txt", "a blind check"},
+    {FolderKind::kOther, "commands.csv", "the log of a run"},
 };
 
 // Of the long command that keeps its simulations in the folder; empty: of an older diagnosis, or

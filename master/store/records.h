@@ -12,6 +12,8 @@
 
 namespace gapfarm {
 
+inline constexpr char kStoredTime[] = "%Y-%m-%dT%H:%M:%SZ";  // of times in a store
+
 // Fixed when a run is created.
 struct RunInfo {
   std::string program_version;  // create() fills in this build's when empty

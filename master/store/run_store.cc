@@ -97,7 +97,7 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   RunInfo complete = info;
   if (complete.program_version.empty()) complete.program_version = build_info().version;
   if (complete.fingerprint.empty()) complete.fingerprint = build_info().fingerprint;
-  complete.created = utc_text(unix_now_s(), "%Y-%m-%dT%H:%M:%SZ");
+  complete.created = utc_text(unix_now_s(), kStoredTime);
   RETURN_IF_ERROR(create_tables(database, complete));
   RETURN_IF_ERROR(sync_to_disk(run));
 

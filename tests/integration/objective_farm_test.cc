@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <chrono>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "tests/integration/program_runs.h"
@@ -10,6 +12,7 @@ namespace gapfarm::objective_farm_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class ObjectiveFarm : public ProgramRuns {
  protected:
@@ -102,6 +105,17 @@ TEST_F(ObjectiveFarm, ResumeRefusesAProgramThatDeclaresOtherThings) {
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("declares other things than when the run began"));
   EXPECT_EQ(status("run")["generation"], 1);
+}
+
+TEST_F(ObjectiveFarm, ResumeNamesAProgramThatWasWrittenSince) {
+  ASSERT_EQ(evolve(config(), "run", "1").exit_code, 0);
+  const std::filesystem::path program = folder_.path() / "bowl.py";
+  const auto resumed = [&](std::chrono::hours later) {
+    std::filesystem::last_write_time(program, std::filesystem::last_write_time(program) + later);
+    return gapfarm_command({"resume", folder_ / "run", "--dry-run"}).err;
+  };
+  EXPECT_THAT(resumed(std::chrono::hours(-1)), Not(HasSubstr("written after the run began")));
+  EXPECT_THAT(resumed(std::chrono::hours(2)), HasSubstr("bowl.py was written after the run began"));
 }
 
 TEST_F(ObjectiveFarm, ARunOfCrashesAloneHasFailed) {

@@ -1,9 +1,13 @@
 // gapfarm resume RUN: continue a run from its last generation, or from an earlier one.
+#include <sys/stat.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
+#include "common/progress/number_text.h"
 #include "common/trials/files.h"
 #include "master/cli/evolution/evolution.h"
 #include "master/cli/evolution/search_start.h"
@@ -32,6 +36,22 @@ void note_changed_robot(const Config& config, Console& console) {
   console.note(config.robot_path +
                " has changed since the run began, which goes on with the robot as it was; "
                "`gapfarm evolve` takes the file as it is");
+}
+
+// What it declares may be as it was, and what it computes another thing.
+void note_changed_program(const Config& config, const std::string& began, Console& console) {
+  if (!config.problem.external) return;
+  const ExternalCommand& command = config.problem.external->command;
+  for (const std::string& argument : command.argv) {
+    struct stat file;
+    const std::string path = std::filesystem::path(command.folder) / argument;
+    if (stat(path.c_str(), &file) != 0 || !S_ISREG(file.st_mode)) continue;
+    const std::string written = utc_text(static_cast<double>(file.st_mtime), kStoredTime);
+    if (written <= began) continue;
+    console.note(path +
+                 " was written after the run began: unless it computes the same, scores of "
+                 "before and of now cannot be compared; begin another run by `gapfarm evolve`");
+  }
 }
 
 // An error where the program of a user's that the run needs is not what it began with.
@@ -72,6 +92,7 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto generations, reader.generations());
   ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
   note_changed_robot(config, context.console);
+  note_changed_program(config, reader.info().created, context.console);
   const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
   const std::uint64_t from = std::min(command.branch.generation.value_or(last), last);
   return print_dry_run(
@@ -89,6 +110,7 @@ Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
   overrides.merge(command.options.overrides);
   ASSIGN_OR_RETURN(Config config, stored_config(reader.info(), overrides));
   note_changed_robot(config, context.console);
+  note_changed_program(config, reader.info().created, context.console);
   RETURN_IF_ERROR(branch_off(reader, command.branch, config));
   RETURN_IF_ERROR(check_runnable(config));
   RETURN_IF_ERROR(check_program(config, command.run));
@@ -127,6 +149,7 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
   const Result<Config> config = stored_config(store.info(), command.options.overrides);
   if (!config) return stopped_by(store, {command.run + ": " + config.error().message});
   note_changed_robot(*config, context.console);
+  note_changed_program(*config, store.info().created, context.console);
   if (command.branch.generation) {
     const auto kept = store.truncate_after(*command.branch.generation);
     if (!kept) return stopped_by(store, kept.error());

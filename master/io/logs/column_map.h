@@ -92,6 +92,9 @@ Error no_rows(const std::vector<Recording>& recordings, const TableMap& map,
 // counted to `before`; NaN: nothing yet.  REQUIRES: fewer than half of them a row.
 double counted_on(double wraps, double before, double count);
 
+// Whether these are no times of a clock, but how long each row lasts; `second`: s of one of them.
+bool are_durations(const std::vector<double>& times, double second);
+
 // Whether a column, of 50 rows or more, steps by more than half of its range.
 bool seems_to_wrap(const LogTable& table, std::size_t column);
 

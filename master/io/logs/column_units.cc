@@ -4,11 +4,19 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/math/statistics.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {
+
+// Of a clock more steps lead on, runs' beginnings and a few rows in disorder aside.
+constexpr double kLeastLeadOn = 0.75;
+constexpr double kLeastGrowth = 0.5;  // the same over the sum of all steps, whatever their sign
+// What rows last: the longest, s, and how uneven they are, over their middle or below it.
+constexpr double kLongestRow_s = 10;
+constexpr double kMostUneven = 10;
 
 // The map's unit, else the file's where the map does not say what one of the column is.
 Result<std::string> unit_of(const LogTable& table, const MappedColumn& c) {
@@ -91,6 +99,20 @@ Error no_rows(const std::vector<Recording>& recordings, const TableMap& map,
 double counted_on(double wraps, double before, double count) {
   if (!(wraps > 0) || !std::isfinite(before)) return count;
   return before + std::remainder(count - before, wraps);
+}
+
+bool are_durations(const std::vector<double>& times, double second) {
+  double lead_on = 0, steps = 0;
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    lead_on += times[i] > times[i - 1] ? 1 : 0;
+    steps += std::abs(times[i] - times[i - 1]);
+  }
+  if (lead_on >= kLeastLeadOn * (static_cast<double>(times.size()) - 1)) return false;
+  if (times.back() - times.front() > kLeastGrowth * steps) return false;
+  const double middle = median(times);
+  const auto [least, most] = std::ranges::minmax(times);
+  return least > middle / kMostUneven && most < middle * kMostUneven &&
+         most * second <= kLongestRow_s;
 }
 
 bool seems_to_wrap(const LogTable& table, std::size_t column) {

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <regex>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/recordings/increment_noise.h"
 #include "master/io/logs/column_map.h"
@@ -15,12 +17,9 @@ namespace {
 constexpr double kFastest_m_s = 30;
 // A stamp further from the time of recording is on a clock of its own, or was never set.
 constexpr double kNearClocks_s = 60;
-// Of a clock more steps lead on, runs' beginnings and a few rows in disorder aside.
-constexpr double kLeastLeadOn = 0.75;
-constexpr double kLeastGrowth = 0.5;  // the same over the sum of all steps, whatever their sign
-// What rows last: the longest, s, and how uneven they are, over their middle or below it.
-constexpr double kLongestRow_s = 10;
-constexpr double kMostUneven = 10;
+// Whole numbers, of which rows are this many apart, count ms, us or ns: a robot's rows are between
+// 1 ms and 5 s apart.
+constexpr double kFewestMs = 5, kFewestUs = 1e3, kFewestNs = 1e6;
 
 // "Vicon x [mm]" to "vicon.x"; paths and blanks become dots, units in brackets go.
 std::string plain(const std::string& name) {
@@ -117,14 +116,7 @@ double greatest(const std::vector<double>& values) {
 }
 
 bool has_word(const std::string& name, const std::string& word) {
-  for (std::size_t at = name.find(word); at != name.npos; at = name.find(word, at + 1)) {
-    const bool before = at == 0 || std::isalnum(static_cast<unsigned char>(name[at - 1])) == 0;
-    const std::size_t end = at + word.size();
-    const bool after =
-        end >= name.size() || std::isalnum(static_cast<unsigned char>(name[end])) == 0;
-    if (before && after) return true;
-  }
-  return false;
+  return std::regex_search(name, std::regex("(^|[^A-Za-z0-9])" + word + "([^A-Za-z0-9]|$)"));
 }
 
 // The unit in "v [km/h]" or "v (km/h)", where it is known.
@@ -190,29 +182,14 @@ class Guess {
     map_.gyro.columns.push_back({"yaw_rate", rate, rate_unit(table, rate)});
   }
 
-  void start(const LogTable& table, const std::string& time, TableMap& to) const {
+  void start(const LogTable& table, const std::string& time, TableMap& to) {
     to = {};
     to.source = table.topic;
     to.run = column_of(table, kRun);
     to.columns.push_back({"t", time, time_unit(table, time)});
     const std::string& unit = to.columns.back().unit;
     to.intervals =
-        lasts(numbers(table, time), unit_factor(unit.empty() ? table.unit_of(time) : unit));
-  }
-
-  // Whether these are no times of a clock, but how long each row lasts.
-  static bool lasts(const std::vector<double>& times, double second) {
-    double lead_on = 0, steps = 0;
-    for (std::size_t i = 1; i < times.size(); ++i) {
-      lead_on += times[i] > times[i - 1] ? 1 : 0;
-      steps += std::abs(times[i] - times[i - 1]);
-    }
-    if (lead_on >= kLeastLeadOn * (static_cast<double>(times.size()) - 1)) return false;
-    if (times.back() - times.front() > kLeastGrowth * steps) return false;
-    const double middle = median(times);
-    const auto [least, most] = std::ranges::minmax(times);
-    return least > middle / kMostUneven && most < middle * kMostUneven &&
-           most * second <= kLongestRow_s;
+        are_durations(numbers(table, time), unit_factor(unit.empty() ? table.unit_of(time) : unit));
   }
 
   void guess_poses(const LogTable& table, const std::string& time, bool odometry) {
@@ -316,14 +293,32 @@ class Guess {
     return !table.unit_of(column).empty();
   }
 
+  static std::string whole(double number) { return std::to_string(static_cast<long>(number)); }
+
+  std::string taken_as(const std::string& unit, const std::string& why) {
+    std::string note = why + ": taken as " + unit;
+    if (!contains(map_.notes, note)) map_.notes.push_back(std::move(note));
+    return unit;
+  }
+
   // Clocks count seconds since 1970 or since something; a day has 86,400.
-  std::string time_unit(const LogTable& table, const std::string& column) const {
+  std::string time_unit(const LogTable& table, const std::string& column) {
     if (stated(table, column)) return "";
     if (has_word(column, "ns")) return "ns";
     if (has_word(column, "us")) return "us";
     if (has_word(column, "ms")) return "ms";
-    const double most = greatest(numbers(table, column));
-    return most > 1e17 ? "ns" : most > 1e14 ? "us" : most > 1e11 ? "ms" : "s";
+    const std::vector<double> times = numbers(table, column);
+    const double most = greatest(times);
+    if (most > 1e11) return most > 1e17 ? "ns" : most > 1e14 ? "us" : "ms";
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < times.size(); ++i) {
+      if (times[i] != std::floor(times[i])) return "s";
+      if (times[i] > times[i - 1]) steps.push_back(times[i] - times[i - 1]);
+    }
+    const double step = steps.empty() ? 0 : median(steps);
+    if (step < kFewestMs) return "s";
+    const char* unit = step < kFewestUs ? "ms" : step < kFewestNs ? "us" : "ns";
+    return taken_as(unit, column + " grows by " + whole(step) + " a row");
   }
 
   std::string length_unit(const LogTable& table, const TableMap& found) {
@@ -344,12 +339,9 @@ class Guess {
       if (dt > 0 && dx > 0) speeds.push_back(dx / dt);
     }
     if (speeds.size() < 2) return "m";
-    std::nth_element(speeds.begin(), speeds.begin() + speeds.size() / 2, speeds.end());
-    const double median = speeds[speeds.size() / 2];
-    if (median < kFastest_m_s) return "m";
-    map_.notes.push_back("x changes by " + std::to_string(static_cast<long>(median)) +
-                         " a second, half of the time by more: taken as mm");
-    return "mm";
+    const double middle = median(speeds);
+    if (middle < kFastest_m_s) return "m";
+    return taken_as("mm", "x changes by " + whole(middle) + " a second, half of the time by more");
   }
 
   // Headings in radians stay within a turn or grow smoothly past it; 60 rad are ten turns.
@@ -363,10 +355,7 @@ class Guess {
     }
     if (greatest(values) < 60 && jump < 60) return "rad";
     if (jump < 60 && greatest(values) < 361 && values.size() > 1) {
-      map_.notes.push_back(column + " reaches " +
-                           std::to_string(static_cast<long>(greatest(values))) +
-                           ": taken as degrees");
-      return "deg";
+      return taken_as("deg", column + " reaches " + whole(greatest(values)));
     }
     return jump >= 60 ? "deg" : "rad";
   }

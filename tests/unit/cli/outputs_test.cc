@@ -101,6 +101,10 @@ TEST(Outputs, DoesNotMixWhatFoldersAreFor) {
   EXPECT_EQ(message_of(check_folder(diagnosis, FolderKind::kDiagnosis)), "");
   EXPECT_EQ(message_of(check_folder(folder / "none", FolderKind::kRun)), "");
   EXPECT_THAT(message_of(forced().plan_in(run, {"model.toml"})), HasSubstr("holds a run"));
+  folder.write("tuesday/commands.csv", "");
+  const std::string logs = folder / "tuesday";
+  EXPECT_THAT(message_of(check_folder(logs, FolderKind::kRun)), HasSubstr("the log of a run"));
+  EXPECT_EQ(message_of(check_folder(logs, FolderKind::kOther)), "");  // what import writes
 }
 
 }  // namespace gapfarm::outputs_test

@@ -74,6 +74,25 @@ TEST(TextLogs, HeadedCsv) {
             "0,10000,1000,2000,28.64788976,0.1,0\r\n1,10100,1100,2000,34.37746771,0.3,-0.2\r\n"}));
 }
 
+// Times without a unit count what puts a robot's rows between 1 ms and 5 s apart.
+TEST(TextLogs, WholeTimesThatAreFarApartCountParts) {
+  const auto read_at = [](const std::vector<std::string>& times) {
+    std::string log = "t,x,y,theta,v,omega\n";
+    for (const std::string& t : times) log += t + ",1,2,0.5,0.1,0\n";
+    return read({log});
+  };
+  const auto unit = [&](const std::vector<std::string>& times) {
+    return read_at(times).map.poses.find("t")->unit;
+  };
+  EXPECT_EQ(unit({"0", "50", "100", "150"}), "ms");
+  EXPECT_EQ(unit({"0", "20000", "40000"}), "us");
+  EXPECT_EQ(unit({"0", "10000000", "20000000"}), "ns");
+  EXPECT_EQ(unit({"0", "1", "2", "3"}), "s");
+  EXPECT_EQ(unit({"0", "7.5", "15"}), "s");
+  EXPECT_THAT(read_at({"0", "50", "100"}).map.notes,
+              ElementsAre("t grows by 50 a row: taken as ms"));
+}
+
 // A column of times that do not lead on is how long each row lasts; dx and dy are increments.
 TEST(TextLogs, IncrementsOfRowsThatLast) {
   const Read r =

@@ -372,7 +372,9 @@ TEST(ReadFiles, RefusesWhatCannotBeOneLog) {
   EXPECT_THAT(error({paths}), HasSubstr("name the trials.csv beside it"));
   EXPECT_THAT(error({}), HasSubstr("no trial files"));
   EXPECT_THAT(error({folder / "none.csv"}), HasSubstr("no such file"));
-  EXPECT_THAT(error({folder / "c"}), HasSubstr("is a folder, expected a file"));
+  EXPECT_THAT(error({folder / "c"}), HasSubstr("is a folder, expected a file; name the files"));
+  folder.write("c/model.toml", "");
+  EXPECT_THAT(error({folder / "c"}), HasSubstr("name " + (folder / "c/model.toml")));
 }
 
 }  // namespace gapfarm::read_test
