@@ -102,12 +102,13 @@ void add_genes(const Problem& problem, const Genome& point, const std::vector<st
     of.gene = gene;
     of.value = decode_gene(problem.table(), gene, g);
     of.deviation = std::sqrt(covariance(k, k));
-    const double low = std::clamp(top[k] - kNormal_95 * of.deviation, 0.0, 1.0);
-    const double high = std::clamp(top[k] + kNormal_95 * of.deviation, 0.0, 1.0);
-    of.interval_95 = {decode_gene(problem.table(), gene, low),
-                      decode_gene(problem.table(), gene, high)};
+    const double low = top[k] - kNormal_95 * of.deviation;
+    const double high = top[k] + kNormal_95 * of.deviation;
+    of.interval_95 = {decode_gene(problem.table(), gene, std::clamp(low, 0.0, 1.0)),
+                      decode_gene(problem.table(), gene, std::clamp(high, 0.0, 1.0))};
     of.determined = report.reliable && 2 * kNormal_95 * of.deviation < settings.share;
-    of.at_bound = g < kAtBound_share || g > 1 - kAtBound_share;
+    const auto [least, most] = of.determined ? std::minmax({g, low, high}) : std::minmax({g, g});
+    of.at_bound = least < kAtBound_share || most > 1 - kAtBound_share;
     report.genes.push_back(of);
   }
 }

@@ -32,7 +32,8 @@ struct GeneDetermined {
   double deviation = 0;  // s.d., share of the range; no more than leads out of some gene's range
   Interval interval_95;  // about the quadratic's top, cut off at the range
   bool determined = false;
-  bool at_bound = false;  // the point lies within a hundredth of an end of the range
+  // The point, or a determined gene's interval, comes within a hundredth of an end of the range.
+  bool at_bound = false;
 };
 
 struct Compensation {  // two genes that make up for one another

@@ -63,6 +63,17 @@ TEST(Determine, ReadsTheCovarianceOffTheCurvature) {
   EXPECT_THAT(determine_csv(*report, problem.table()), HasSubstr("\nmass,0.5"));
 }
 
+TEST(Determine, SaysWhereAnIntervalIsCutOffByTheRange) {
+  const Problem problem = three_genes(50);
+  const Eigen::Matrix3d information = 400 * Eigen::Matrix3d::Identity();
+  const auto report =
+      determine(problem, {0.9, 0.5, 0.5, 0.5}, quadratic(information, {0.93, 0.5, 0.5}, 50), {});
+  ASSERT_TRUE(report.ok());
+  EXPECT_TRUE(of(*report, 0).determined);
+  EXPECT_TRUE(of(*report, 0).at_bound);
+  EXPECT_FALSE(of(*report, 1).at_bound);
+}
+
 // Only the difference of two genes matters: each alone would look determined.
 TEST(Determine, SeesGenesThatMakeUpForOneAnother) {
   const Problem problem = three_genes(50);
