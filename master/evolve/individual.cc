@@ -10,6 +10,10 @@
 namespace gapfarm {
 namespace {
 
+// Generations whose genomes are not scored twice: chosen, for what a search proposes again it
+// proposed shortly before.
+constexpr std::size_t kRemembered = 16;
+
 Standing standing_of(std::uint32_t outcome, double cost, double m2, std::uint32_t scores) {
   const int value = static_cast<int>(outcome);
   return {v1::Outcome_IsValid(value) ? static_cast<v1::Outcome>(value) : v1::OUTCOME_UNSPECIFIED,
@@ -189,7 +193,7 @@ CountingOptimiser::CountingOptimiser(const OptimiserSetup& setup)
       full_scores_(setup.noisy ? std::max(1U, setup.settings.elite_replicates) : 1),
       births_apart_(setup.births_apart),
       next_birth_id_(setup.first_birth),
-      seen_(setup.remembered) {}
+      seen_(kRemembered * setup.settings.population) {}
 
 Stream CountingOptimiser::stream_of(std::uint64_t birth_id) const {
   return Stream({.run_seed = run_seed_,

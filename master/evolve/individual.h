@@ -45,14 +45,13 @@ void sort_best_first(std::vector<Individual>& individuals);
 // Mean distance of the genes from their mean over the individuals, in [0, 1]; 0 for none.
 double diversity_of(const std::vector<Individual>& individuals);
 
-// Genomes scored in this run, so that a duplicate costs nothing.  Keyed by 64 bits of a hash of
-// the genome's bits: with kLimit genomes two differ in less than that with a chance of 1e-11.
+// Genomes scored of late, so that a duplicate costs nothing.  Keyed by 64 bits of a hash of the
+// genome's bits: of 16,000 genomes two differ in less than that with a chance of 1e-11.
 class SeenGenomes {
  public:
-  // The last so many genomes are kept, which bounds the optimiser's state to some 500 kB.
-  static constexpr std::size_t kLimit = 16384;
-
-  explicit SeenGenomes(std::size_t limit = kLimit) : limit_(limit) {}
+  // The last so many genomes are kept, which bounds the optimiser's state: every generation's is
+  // stored.
+  explicit SeenGenomes(std::size_t limit) : limit_(limit) {}
 
   static std::uint64_t key(const Genome& genome);
 

@@ -125,7 +125,6 @@ OptimiserSetup IslandsOptimiser::setup_of(const OptimiserSetup& whole, std::size
   settings.asynchronous = false;
   settings.population = static_cast<unsigned>(whole_ / count + (island < whole_ % count ? 1 : 0));
   settings.optimiser.population = settings.population;
-  setup.remembered = std::max<std::size_t>(setup.remembered / count, 4 * settings.population);
   setup.first_birth = island;  // and draws of its own with it
   setup.births_apart = count;
   setup.given.clear();

@@ -101,8 +101,7 @@ struct OptimiserSetup {
   // How unsure that genome is: a covariance in gene units, row by row; empty: unknown.
   std::vector<double> spread;
   std::uint64_t run_seed = 0;
-  bool noisy = false;              // scores differ between replicates (SpreadKind::kSampled)
-  std::size_t remembered = 16384;  // genomes that are not scored twice (SeenGenomes)
+  bool noisy = false;  // scores differ between replicates (SpreadKind::kSampled)
   // Members of the first generation beside the nominal one, best first.
   std::vector<Genome> given = {};
   // Birth ids: the first, and how far the next is from one.

@@ -260,15 +260,16 @@ TEST(Standing, IsTheMeanOfItsScoresAndTheWorstOfItsOutcomes) {
 }
 
 TEST(SeenGenomes, KeepsTheLatest) {
-  SeenGenomes seen;
+  constexpr std::size_t kLimit = 1000;
+  SeenGenomes seen(kLimit);
   Standing standing;
   standing.add({v1::OK, 1});
-  for (std::size_t i = 0; i < SeenGenomes::kLimit + 10; ++i) {
+  for (std::size_t i = 0; i < kLimit + 10; ++i) {
     seen.remember({static_cast<double>(i)}, standing);
   }
   seen.remember({5.0}, standing);
   seen.trim();
-  EXPECT_EQ(seen.size(), SeenGenomes::kLimit);
+  EXPECT_EQ(seen.size(), kLimit);
   EXPECT_EQ(seen.find({3.0}), nullptr);
   EXPECT_NE(seen.find({11.0}), nullptr);
 }
