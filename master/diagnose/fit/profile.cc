@@ -17,7 +17,7 @@ constexpr double kAside = 2, kLeastAside = 0.5;
 // Steps in which the others follow (straight valleys need none), moves to somewhere better, and
 // rounds of the fit that goes on from there: chosen for the CPU seconds that they cost, on blind
 // checks of seeds 41, 43 and 47.
-constexpr int kFollowing = 2, kMostMoves = 4, kFitRounds = 2;
+constexpr int kFollowing = 2, kMostMoves = 4;
 // Times the standard error of the slopes; chosen, for a rise of nothing would make it infinite.
 constexpr double kWidest = 3;
 
@@ -151,7 +151,7 @@ Result<JointFit> profiled(Predictor& predictor, const Study& study,
   }
   ASSIGN_OR_RETURN(
       fit, fit_jointly(predictor, study, effects, space.values(middle.u), BaseParameters::kFitted,
-                       no_nuisances(study), kFitRounds, Loss::kRedescending));
+                       no_nuisances(study), infer::kLongSearch, Loss::kRedescending));
   for (std::size_t k = 0; k < bent.size(); ++k) {
     fit.parameters[k].bent = bent[k];
     fit.parameters[k].standard_error *= bent[k];

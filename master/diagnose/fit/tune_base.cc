@@ -13,7 +13,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kTuningRounds = 6;
 constexpr double kGainStep = 0.02;
 constexpr double kSameSlope = 0.05;   // relative: a parameter that moves the ends as the gain does
 constexpr double kLeastAhead = 0.05;  // mean duty of a drive that does
@@ -141,7 +140,7 @@ Status fit_base(Predictor& predictor, Study* study) {
     const bool some = omit_far_turns(round, &seen);
     ASSIGN_OR_RETURN(const auto fit,
                      fit_jointly(predictor, seen, {}, study->base, BaseParameters::kFitted,
-                                 misfit_columns(seen), some ? 2 : kTuningRounds));
+                                 misfit_columns(seen), some ? 2 : infer::kLongSearch));
     for (const BaseParameter& p : study->drive.tuned) {
       const auto [lower, upper] = tunable((*study->table)[p.row]);
       study->base[p.row] = std::clamp(fit.at.at(p.row), lower, upper);

@@ -280,30 +280,35 @@ class Selection {
   std::optional<Found> found_;
 };
 
-// What retuning the base would do depends on what was chosen: on a slope friction shows, on a flat
-// floor hardly.
-Status measure_nuisances_there(const DiagnosisRequest& of, const JointFit& fit,
-                               Screening* screening) {
-  auto evidence = evidence_at(of, *screening->found.evidence, fit);
-  // What cannot be simulated there stays as it is at the base.
-  if (!evidence) {
-    return evidence.error().code == ErrorCode::kSimulation ? Status() : evidence.error();
-  }
-  auto there = std::make_shared<const Evidence>(std::move(*evidence));
-  screening->catalogue->move_beside(there->study, there->base);
-  screening->found.evidence = std::move(there);
-  return {};
+// What is chosen, fitted together from there, base and nuisances beside it to first order.
+Result<JointFit> estimate(const DiagnosisRequest& of, const Explanation& named,
+                          const Overrides& start) {
+  const BaseParameters base = named.frees_base ? BaseParameters::kFitted : BaseParameters::kHeld;
+  const Study& study = named.study();
+  const Eigen::MatrixXd& nuisances = named.evidence->nuisances;
+  const auto fit_from = [&](const Overrides& at) {
+    return fit_jointly(of.predictor, study, named.chosen, at, base, nuisances, infer::kLongSearch);
+  };
+  auto fit = fit_from(start);
+  if (!fit) return fit;
+  ASSIGN_OR_RETURN(const auto moved, move_seams(of.predictor, study, nuisances, &*fit));
+  return moved ? fit_from(fit->at) : std::move(fit);
 }
 
 // The chosen effects beside the base as it was tuned: data as if their predictions were linear.
-Status relinearise(const DiagnosisRequest& of, Screening* screening) {
+// What retuning that base would do depends on what was chosen, and is measured beside it: on a
+// slope friction shows, on a flat floor hardly.
+Status relinearise(const DiagnosisRequest& of, const infer::Model& model, Screening* screening) {
   Explanation& named = screening->found;
-  const std::vector<EffectCandidate>& effects = named.chosen;
-  ASSIGN_OR_RETURN(auto first, estimate(of, *screening->catalogue, named, effects, 2));
-  named.estimates = std::move(first);
-  RETURN_IF_ERROR(measure_nuisances_there(of, *named.estimates, screening));
-  ASSIGN_OR_RETURN(auto fit, estimate(of, *screening->catalogue, named, effects, 2));
-  ASSIGN_OR_RETURN(const auto there, relinearised_at(of, named.study(), fit, effects));
+  const Overrides start = model.space.values(model.fit.u);
+  ASSIGN_OR_RETURN(auto evidence, evidence_at(of, *named.evidence, start));
+  if (evidence) {
+    auto there = std::make_shared<const Evidence>(std::move(*evidence));
+    screening->catalogue->move_beside(there->study, there->base);
+    named.evidence = std::move(there);
+  }
+  ASSIGN_OR_RETURN(auto fit, estimate(of, named, start));
+  ASSIGN_OR_RETURN(const auto there, relinearised_at(of, named.study(), fit, named.chosen));
   named.estimates = std::move(fit);
   emit_fit(of, *named.estimates);
   if (there.columns.empty()) return {};
@@ -329,9 +334,10 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Study& from
       of.predictor, named.study(), std::vector<Signature>(), named.evidence->base);
   screening->explained = sum_of_gains(named.chosen);
   if (named.chosen.empty()) return {};
-  ASSIGN_OR_RETURN(named.estimates,
-                   fit_jointly(of.predictor, named.study(), named.chosen, named.study().base,
-                               BaseParameters::kFitted, named.evidence->nuisances, 1));
+  ASSIGN_OR_RETURN(named.estimates, fit_jointly(of.predictor, named.study(), named.chosen,
+                                                named.study().base, BaseParameters::kFitted,
+                                                named.evidence->nuisances, infer::kLongSearch));
+  emit_fit(of, *named.estimates);
   return {};
 }
 
@@ -370,7 +376,7 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
   if (moves) {
     RETURN_IF_ERROR(move_to(of, selected, before->study, &screening));
   } else if (!screening.found.chosen.empty()) {
-    if (Status s = relinearise(of, &screening); !s) return s.error();
+    if (Status s = relinearise(of, selected.model, &screening); !s) return s.error();
   }
   return screening;
 }

@@ -136,13 +136,18 @@ Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study) {
   return evidence_beside(std::move(study), std::move(nuisances), std::move(blocks));
 }
 
-Result<Evidence> evidence_at(const DiagnosisRequest& of, const Evidence& before,
-                             const JointFit& fit) {
+Result<std::optional<Evidence>> evidence_at(const DiagnosisRequest& of, const Evidence& before,
+                                            const Overrides& at) {
+  ASSIGN_OR_RETURN(const auto ends, of.predictor.attempt({{at, {}}}));
+  if (!ends.front()) return std::optional<Evidence>();
   Study there = before.study;
-  there.base = fit.at;
-  for (std::size_t i = 0; i < there.size(); ++i) there.trials[i].X_WP = fit.ends[i];
-  ASSIGN_OR_RETURN(auto nuisances, nuisances_of(of, there));
-  return evidence_beside(before.study, std::move(nuisances), before.blocks);
+  there.base = at;
+  for (std::size_t i = 0; i < there.size(); ++i) there.trials[i].X_WP = (*ends.front())[i];
+  auto nuisances = nuisances_of(of, there);
+  if (!nuisances && nuisances.error().code == ErrorCode::kSimulation)
+    return std::optional<Evidence>();
+  if (!nuisances) return nuisances.error();
+  return std::optional(evidence_beside(before.study, std::move(*nuisances), before.blocks));
 }
 
 Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances) {

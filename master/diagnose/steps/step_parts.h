@@ -14,7 +14,6 @@ namespace gapfarm::steps {
 
 // Squared distance beyond which a trial is an outlier, with 3 degrees of freedom: one in 110.
 inline constexpr double kSlippedSquared = 11.5;
-inline constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
 
 // Hypotheses compete, beside what is explained already; what was chosen before is chosen anew.
 Result<Screening> compete(const DiagnosisRequest& of, Explanation found);
@@ -48,9 +47,9 @@ Evidence evidence_beside(Study study, Eigen::MatrixXd nuisances,
                          std::vector<CovariateBlock> blocks);
 // The study's nuisances and covariates by its present noise.
 Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study);
-// The same beside nuisances as they are where that fit ended.
-Result<Evidence> evidence_at(const DiagnosisRequest& of, const Evidence& before,
-                             const JointFit& fit);
+// The same beside nuisances as they are there; none where that cannot be simulated.
+Result<std::optional<Evidence>> evidence_at(const DiagnosisRequest& of, const Evidence& before,
+                                            const Overrides& at);
 // Nuisances, and before them what the gains of the study's sessions do.
 Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances);
 // The same without what these trials say.
@@ -82,14 +81,6 @@ Regression explained_by(const Proposals& catalogue, const Explanation& explanati
 double explained_nats(const Proposals& catalogue, const Regression& explained);
 
 double sum_of_gains(const std::vector<EffectCandidate>& chosen);
-// Base and these effects at their best linear fit.
-Overrides start_of(const DiagnosisRequest& of, const Proposals& catalogue,
-                   const Explanation& partial, const std::vector<EffectCandidate>& effects);
-// The effects fitted together, base and nuisances beside them to first order.
-Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue,
-                          const Explanation& partial, const std::vector<EffectCandidate>& effects,
-                          int rounds);
-
 // What is left beside what is explained, also what repeats of a trial have in common.
 std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regression& explained);
 // What the remaining effects leave at their estimates, where some were dropped.

@@ -50,7 +50,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
                                            const std::vector<std::size_t>& folds) {
   const Study& study = named.study();
   const Eigen::MatrixXd none = no_nuisances(study);
-  const int base_rounds = of.options.keep_base ? 0 : kMostRounds;
+  const int base_rounds = of.options.keep_base ? 0 : infer::kLongSearch;
   std::vector<NestedFit> nested;
   if (named.as_logged) {
     const Study& logged = *named.as_logged;
@@ -69,7 +69,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
     const Study& fitted_in = alone ? study : beside;
     ASSIGN_OR_RETURN(auto fit,
                      fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted,
-                                 none, alone ? base_rounds : kMostRounds));
+                                 none, alone ? base_rounds : infer::kLongSearch));
     if (!alone && count == named.chosen.size()) {
       ASSIGN_OR_RETURN(fit, profiled(of.predictor, fitted_in, effects, std::move(fit)));
     }
@@ -89,24 +89,23 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
 Result<JointFit> estimate_beside(const DiagnosisRequest& of, const Explanation& named,
                                  const NestedFit& with_base) {
   return fit_jointly(of.predictor, named.study(), named.chosen, with_base.fit.at,
-                     BaseParameters::kHeld, named.evidence->nuisances, kMostRounds,
+                     BaseParameters::kHeld, named.evidence->nuisances, infer::kLongSearch,
                      Loss::kRedescending);
 }
 
 // Where more is left than a name allows, what the catalogue does explain is named as no cause; the
 // model that is written has it all the same when held-out trials are clearly better predicted
 // so.
-Result<Refit> with_correction(const DiagnosisRequest& of, const Screening& screening, Refit refit,
+Result<Refit> with_correction(const DiagnosisRequest& of, Refit refit,
                               const std::vector<std::size_t>& folds) {
   const Explanation& named = refit.judged.named;
   if (refit.judged.unnamed.empty() || of.options.keep_base) return refit;
   const std::vector<EffectCandidate>& effects = refit.judged.unnamed;
   const Study& study = named.study();
-  Overrides start =
-      named.estimates ? study.base : start_of(of, *screening.catalogue, named, effects);
+  Overrides start = study.base;
   use_estimates(of, named, effects, &start);
   auto fit = fit_jointly(of.predictor, study, effects, start, BaseParameters::kFitted,
-                         no_nuisances(study), kMostRounds);
+                         no_nuisances(study), infer::kLongSearch);
   if (!fit && fit.error().code == ErrorCode::kSimulation) return refit;
   if (!fit) return fit.error();
   std::vector<std::string> names = mapped(effects, &EffectCandidate::effect);
@@ -198,12 +197,6 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   refit.judged = judgement;
   Explanation& named = refit.judged.named;
   const std::size_t found = named.chosen.size();
-  if (found > 0) {
-    ASSIGN_OR_RETURN(
-        auto fit, estimate(of, *screening.catalogue, named, named.chosen, named.estimates ? 1 : 2));
-    named.estimates = std::move(fit);
-    emit_fit(of, *named.estimates);
-  }
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
   std::set<std::string> were_last;
   for (;;) {
@@ -218,7 +211,7 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
       if (named.chosen.size() < found) {
         refit.judged = judge_again(of, *screening.catalogue, std::move(refit.judged));
       }
-      ASSIGN_OR_RETURN(auto corrected, with_correction(of, screening, std::move(refit), folds));
+      ASSIGN_OR_RETURN(auto corrected, with_correction(of, std::move(refit), folds));
       refit = with_floor(of, std::move(corrected), folds);
       idle = of_no_use(refit.judged, refit.nested, refit.floor, were_last);
     }

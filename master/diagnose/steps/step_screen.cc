@@ -259,37 +259,6 @@ double explained_nats(const Proposals& catalogue, const Regression& explained) {
   return (catalogue.nothing_explained().left_squares() - explained.left_squares()) / 2;
 }
 
-Overrides start_of(const DiagnosisRequest& of, const Proposals& catalogue,
-                   const Explanation& partial, const std::vector<EffectCandidate>& effects) {
-  Overrides at = partial.study().base;
-  for (std::size_t k = 0; k < effects.size(); ++k) {
-    const Regression others = catalogue.with(partial.first, effects, k);
-    set_values(of.table(), start_values(partial.study(), others, effects[k].signature), &at);
-  }
-  return at;
-}
-
-Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue,
-                          const Explanation& partial, const std::vector<EffectCandidate>& effects,
-                          int rounds) {
-  const bool moves = of.subject.base_moves || partial.frees_base;
-  Overrides start = start_of(of, catalogue, partial, effects);
-  for (const EffectCandidate& effect : effects) {
-    for (const auto& [row, value] : partial.estimates ? partial.estimates->at : Overrides{}) {
-      const std::string& belongs = of.table()[row].effect;
-      if (belongs == effect.effect() || (belongs.empty() && moves)) start[row] = value;
-    }
-  }
-  const BaseParameters base = moves ? BaseParameters::kFitted : BaseParameters::kHeld;
-  const Study& study = partial.study();
-  const Eigen::MatrixXd& nuisances = partial.evidence->nuisances;
-  auto fit = fit_jointly(of.predictor, study, effects, start, base, nuisances, rounds);
-  if (!fit) return fit;
-  ASSIGN_OR_RETURN(const auto moved, move_seams(of.predictor, study, nuisances, &*fit));
-  if (!moved) return fit;
-  return fit_jointly(of.predictor, study, effects, fit->at, base, nuisances, rounds);
-}
-
 bool beyond_search(const DiagnosisRequest& of, const Study& tuned) {
   if (of.subject.base_moves || !tuned.on_bounds.empty()) return false;
   return std::ranges::any_of(of.options.genes, [&](const Gene& gene) {
