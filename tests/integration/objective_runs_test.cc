@@ -125,6 +125,7 @@ TEST_F(ObjectiveRuns, TheBestOfNoisyScoresIsTheSameOneEverywhere) {
   EXPECT_THAT(again.out,
               AllOf(HasSubstr("genome " + found["best"]["birth_id"].dump() + " of generation 16"),
                     HasSubstr(" from 8 scores")));
+  EXPECT_THAT(screen("run"), HasSubstr("(of 8 noisy scores, the luckiest of all)"));
   EXPECT_THAT(text_of(folder_.path() / "run" / "model.toml"),
               HasSubstr("\nvalue = " + found["best_fitness"].dump()));
 }

@@ -211,7 +211,9 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
                   ? "; nothing feasible was found yet"
                   : "");
   if (status.generation > 0) {
-    screen.line("", "best {}, mean {}, worst {}", format_number(status.best),
+    const unsigned scores = status.best_individual ? status.best_individual->scores : 1;
+    screen.line("", "best {}{}, mean {}, worst {}", format_number(status.best),
+                scores > 1 ? fmt::format(" (of {} noisy scores, the luckiest of all)", scores) : "",
                 format_number(status.mean), format_number(status.worst));
     const std::size_t columns = std::min<std::size_t>(60, std::max(20u, console.width()) - 13);
     screen.line("", "{}{}", sparkline(status.best_by_generation, columns, info.higher_is_better),
