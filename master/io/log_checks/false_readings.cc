@@ -100,20 +100,27 @@ class Drives {
       commands_.push_back(t.extra);
       commands_.back().push_back(t.command);
       driven.emplace_back();
+      commanded_.push_back(false);
       if (t.tip.empty()) {
         const CommandSpec c = resolved_command(t, problem.commands);
         driven.back() = {c.left, c.right, c.duration_s};
+        commanded_.back() = c.left != 0 || c.right != 0;
         commands_.back() = {formatted("%.17g %.17g %.17g", c.left, c.right, c.duration_s)};
       }
-      ends[commands_.back()].push_back(between(t.X_WS, t.X_WE));
+      if (!repeats_start(driven.size() - 1))
+        ends[commands_.back()].push_back(between(t.X_WS, t.X_WE));
       ++same_end_[key(t.X_WE)];
     }
-    for (const auto& [command, poses] : ends) cells_[command] = cell_of(poses);
+    for (const Command& command : commands_) cells_[command] = cell_of(ends[command]);
     reach_beyond_noise(unsure, &cells_);
     const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven, unsure);
-    std::size_t moved = 0;
-    for (const TrialContext& context : contexts) moved += context.moved ? 1 : 0;
-    chained_ = 2 * moved < contexts.size();
+    std::size_t moved = 0, read = 0;
+    for (const TrialContext& context : contexts) {
+      if (context.previous && repeats_start(*context.previous)) continue;
+      ++read;
+      moved += context.moved ? 1 : 0;
+    }
+    chained_ = 2 * moved < read;
     next_.resize(trials_.size());
     moved_.resize(trials_.size());
     for (std::size_t i = 0; i < contexts.size(); ++i) {
@@ -130,6 +137,8 @@ class Drives {
     const Trial& t = trials_[i];
     const auto& cell = cells_.at(commands_[i]);
     const Pose X_SE = between(t.X_WS, t.X_WE);
+    const bool went_on = next_[i] && moved_[*next_[i]];
+    if (chained_ && went_on && commanded_[i] && repeats_start(i)) return Reading::kContradicted;
     if (!cell || cell->holds(X_SE)) return Reading::kFine;
     if (same_end_.at(key(t.X_WE)) >= kFewestSamePose) return Reading::kContradicted;
     if (next_[i] && !moved_[*next_[i]]) return Reading::kFine;
@@ -138,6 +147,9 @@ class Drives {
     return cell->holds(between(t.X_WS, trials_[*next_[i]].X_WS)) ? Reading::kContradicted
                                                                  : Reading::kUnconfirmed;
   }
+
+  // An end that repeats its start to the last digit was not read, if the robot drove.
+  bool repeats_start(std::size_t i) const { return trials_[i].X_WS == trials_[i].X_WE; }
 
   // How far it ends from where drives of its command do, over how far these reach; 0: nobody knows.
   double distance(std::size_t i) const {
@@ -159,6 +171,7 @@ class Drives {
 
   const std::vector<Trial>& trials_;
   std::vector<Command> commands_;
+  std::vector<bool> commanded_;  // to drive
   Cells cells_;
   std::map<Key, std::size_t> same_end_;
   std::vector<std::optional<std::size_t>> previous_, next_;  // in the session
@@ -204,8 +217,9 @@ std::vector<std::size_t> false_readings(const Problem& problem) {
       rows.push_back(i);
     }
   }
+  const auto was_read = [&](std::size_t i) { return !drives.repeats_start(i); };
   const auto all = static_cast<double>(problem.log.trials.size());
-  if (static_cast<double>(rows.size()) > kMostFalse * all) rows.clear();
+  if (static_cast<double>(std::ranges::count_if(rows, was_read)) > kMostFalse * all) rows.clear();
   return rows;
 }
 

@@ -6,54 +6,14 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <tuple>
 #include <utility>
 
-#include "common/random/stream.h"
 #include "master/io/log_checks/finding.h"
+#include "tests/unit/sanity/drawn_drives.h"
 
 namespace gapfarm::sanity_test {
 
-constexpr double kPi = std::numbers::pi;
-
-struct Robot {
-  double speed_m_s = 0.25;
-  double turn_rad_s = 1.5;  // for a difference of one full duty
-};
-
-Pose driven(const Robot& robot, const CommandSpec& c) {
-  const double travel = robot.speed_m_s * (c.left + c.right) / 2 * c.duration_s;
-  const double turn = robot.turn_rad_s * (c.right - c.left) * c.duration_s;
-  return exp({travel, 0, turn});
-}
-
-// All six commands at three levels and durations, from anywhere in an arena of 2 m.
-Problem drawn_drives(std::size_t count, const Robot& robot = {}, std::uint64_t seed = 1) {
-  Problem problem;
-  problem.values = problem.table().nominal();
-  problem.commands = default_commands("srv1");
-  Stream stream({.run_seed = seed});
-  for (std::size_t i = 0; i < count; ++i) {
-    const CommandSpec& own = problem.commands[stream.below(problem.commands.size())];
-    const double level = 0.5 + 0.25 * static_cast<double>(stream.below(3));
-    Trial t;
-    t.session = "s" + std::to_string(1 + i * 2 / count);
-    t.trial = static_cast<std::int64_t>(i);
-    t.t_s = 5.0 * static_cast<double>(i);
-    t.command = own.name;
-    t.left = level * own.left;
-    t.right = level * own.right;
-    t.duration_s = 0.5 * static_cast<double>(1 + stream.below(3));
-    t.X_WS = {2 * stream.uniform(), 2 * stream.uniform(), kPi * (2 * stream.uniform() - 1)};
-    const Pose noise{0.002 * stream.normal(), 0.002 * stream.normal(), 0.01 * stream.normal()};
-    t.X_WE = t.X_WS * driven(robot, {"", *t.left, *t.right, *t.duration_s}) * noise;
-    problem.log.trials.push_back(t);
-  }
-  return problem;
-}
-
-// Changes every logged pose.
 Problem spoiled(Problem problem, const std::function<Pose(const Pose&)>& change) {
   for (Trial& t : problem.log.trials) {
     for (Pose* X : {&t.X_WS, &t.X_WE}) {
@@ -62,17 +22,6 @@ Problem spoiled(Problem problem, const std::function<Pose(const Pose&)>& change)
     }
   }
   return problem;
-}
-
-std::string first_name(const Problem& problem) {
-  const auto findings = check_sanity(problem);
-  return findings.empty() ? "" : findings.front().name;
-}
-
-std::vector<std::size_t> impossible_trials(const Problem& problem) {
-  std::vector<std::size_t> rows;
-  check_sanity(problem, &rows);
-  return rows;
 }
 
 TEST(Sanity, HasNoWarningsAboutASoundLog) {
@@ -252,19 +201,6 @@ TEST(Sanity, SetsAsideAFewImpossibleRows) {
   EXPECT_FALSE(any_unusable(findings));
 }
 
-// Each trial starts where the one before rests, but for one in ten, which a hand has moved.
-Problem chained_drives(std::size_t count) {
-  Problem problem = drawn_drives(count);
-  std::vector<Trial>& trials = problem.log.trials;
-  for (std::size_t i = 1; i < count; ++i) {
-    if (i % 10 == 0) continue;
-    const Pose X_SE = between(trials[i].X_WS, trials[i].X_WE);
-    trials[i].X_WS = trials[i - 1].X_WE * Pose{0.001, -0.001, 0.003};
-    trials[i].X_WE = trials[i].X_WS * X_SE;
-  }
-  return problem;
-}
-
 Problem with_ends_exchanged(Problem problem) {
   for (Trial& t : problem.log.trials) std::swap(t.X_WS, t.X_WE);
   return problem;
@@ -288,51 +224,6 @@ TEST(Sanity, TakesNoMotorsThatRunBackwardForExchangedEnds) {
   EXPECT_EQ(first_name(with_ends_exchanged(drawn_drives(200))), "direction_reversed");
 }
 
-TEST(Sanity, KnowsReadingsThatOthersContradict) {
-  const Problem sound = chained_drives(600);
-  EXPECT_EQ(impossible_trials(sound), std::vector<std::size_t>());
-  const std::vector<std::size_t> rows = {6, 29, 103, 104, 251};  // 29: then a hand moved it
-  const std::function<void(Trial*)> faults[] = {
-      [](Trial* t) {
-        t->X_WE = {0, 0, 0};
-      },  // lost
-      [](Trial* t) {
-        t->X_WE = t->X_WE * Pose{0, 0, kPi};
-      },  // back for front
-      [](Trial* t) {
-        t->X_WE = t->X_WE * Pose{-0.2, 0.45, 1};
-      },  // another robot's
-  };
-  for (const auto& fault : faults) {
-    Problem log = sound;
-    for (const std::size_t row : rows) fault(&log.log.trials[row]);
-    EXPECT_EQ(impossible_trials(log), rows);
-    EXPECT_FALSE(any_unusable(check_sanity(log)));
-  }
-}
-
-TEST(Sanity, BelievesReadingsThatOthersConfirm) {
-  Problem slipped = chained_drives(300);
-  for (std::size_t i = 0; i < 300; ++i) {
-    if (i % 30 != 6) continue;
-    // From there on the robot is where its slip has led it.
-    const Pose X_WE = slipped.log.trials[i].X_WE;
-    const Pose to = X_WE * Pose{-0.08, 0.05, -0.9} * inverse(X_WE);
-    for (std::size_t j = i; j % 10 != 0; ++j) {
-      Trial& t = slipped.log.trials[j];
-      if (j > i) t.X_WS = to * t.X_WS;
-      t.X_WE = to * t.X_WE;
-    }
-  }
-  EXPECT_EQ(impossible_trials(slipped), std::vector<std::size_t>());
-  Problem late = chained_drives(300);
-  for (std::size_t i = 6; i < 300; i += 30) {
-    Trial& t = late.log.trials[i];
-    t.X_WE = t.X_WS * exp(0.6 * log(between(t.X_WS, t.X_WE)));
-  }
-  EXPECT_EQ(impossible_trials(late), std::vector<std::size_t>());
-}
-
 TEST(Sanity, ReportsHeadingsInWholeDegrees) {
   const double degree = kPi / 180;
   const Problem log = spoiled(drawn_drives(200), [degree](const Pose& X) {
@@ -340,13 +231,6 @@ TEST(Sanity, ReportsHeadingsInWholeDegrees) {
   });
   EXPECT_EQ(first_name(log), "headings_rounded");
   EXPECT_THAT(check_sanity(log).front().text, testing::HasSubstr("(1 deg)"));
-}
-
-TEST(Sanity, LeavesOutWhatIsLikeNoOther) {
-  Problem log = drawn_drives(600);  // a hand puts the robot in place before each: none confirms
-  log.log.trials[77].X_WE = log.log.trials[77].X_WE * Pose{0, 0, kPi};
-  EXPECT_EQ(impossible_trials(log), std::vector<std::size_t>{77});
-  EXPECT_EQ(first_name(log), "false_readings");
 }
 
 TEST(Sanity, WarningsWhatCannotReportAnything) {
