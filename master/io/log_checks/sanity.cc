@@ -22,15 +22,19 @@ constexpr double kTimesAsFar = 2;
 constexpr std::size_t kFewestFollowing = 8, kTimesAsMany = 5;
 constexpr double kBeyond_m = 0.3;  // what a camera's seam or a late reading may add
 
-// Nobody says how fast and how wide a program's robot may be, so no log is questioned for it.
-constexpr double kSlowestProgram_m_s = 0.005;
+// Nobody says how fast and how wide a program's robot may be; nothing on wheels in a user's log
+// goes faster.
+constexpr double kSlowestProgram_m_s = 0.005, kFastestProgram_m_s = 30;
 
 bool has_drives(const Problem& problem) {
   return problem.scenario == "srv1" || problem.scenario == "external";
 }
 
 DriveLimits limits_of(const Problem& problem) {
-  if (scenario_form(problem.scenario).program) return {kSlowestProgram_m_s, INFINITY, 0, 0};
+  if (scenario_form(problem.scenario).program) {
+    return {kSlowestProgram_m_s, kFastestProgram_m_s,
+            std::sqrt(kSlowestProgram_m_s * kFastestProgram_m_s), 0};
+  }
   const Parameter& speed = problem.table()[row_of(Srv1::kFullSpeed)];
   return {speed.lower, speed.upper, problem.values[row_of(Srv1::kFullSpeed)],
           problem.values[row_of(Srv1::kTrackGauge)]};

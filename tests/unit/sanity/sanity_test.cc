@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "common/external/protocol.h"
 #include "master/io/log_checks/finding.h"
 #include "tests/unit/sanity/drawn_drives.h"
 
@@ -162,6 +163,26 @@ TEST(Sanity, ReportsWhichUnitAndWhichAxis) {
     return Pose{-X.x, X.y, X.theta};
   }));
   EXPECT_NE(x.find("sign of x0 and x1"), std::string::npos) << x;
+}
+
+// Nobody knows how fast a program's robot may be, but wheels carry none at hundreds of m/s.
+TEST(Sanity, ReportsUnitsOfAProgramsRobot) {
+  Problem log = drawn_drives(150);
+  log.scenario = "external";
+  const auto program = make_external_program(
+      {{"program"}, "."},
+      R"({"gapfarm": 1, "parameters": [{"key": "v", "lower": 0, "upper": 9, "nominal": 1}]})",
+      false);
+  ASSERT_TRUE(program) << program.error().message;
+  log.external = *program;
+  log.values = log.table().nominal();
+  EXPECT_EQ(first_name(log), "");
+  const auto found = check_sanity(spoiled(log, [](const Pose& X) {
+    return Pose{1000 * X.x, 1000 * X.y, X.theta};
+  }));
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].name, "unit_error");
+  EXPECT_THAT(found[0].text, testing::HasSubstr("millimetres"));
 }
 
 TEST(Sanity, SwappedCommandsAreSwappedSides) {
