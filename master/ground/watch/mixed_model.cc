@@ -13,7 +13,6 @@ namespace {
 constexpr double kPriorRuns = 4;  // of the variances from run to run
 // Values of runs, of the dispersion: what scatters is to be a value's own, not all values'.
 constexpr double kPriorDispersion = 1e4;
-constexpr double kPriorRobots = 4;
 constexpr int kSharedRounds = 12;
 constexpr double kTail = 0.1;  // of maxima, whose excess is exponential
 
@@ -91,7 +90,7 @@ void estimate_variances(std::vector<RobotRuns>* robots, RunVariances* at, int ro
         robot.weights[i] = (kRunTail + size) / (kRunTail + fit.residuals[i].dot(a));
       }
     }
-    at->between = (between.array() + kPriorRuns) / (runs + kPriorRuns);
+    at->between = (between + kPriorRuns * at->prior) / (runs + kPriorRuns);
     at->dispersion = (own + kPriorDispersion) / (runs * size + kPriorDispersion);
   }
 }
@@ -129,35 +128,17 @@ std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const Robot
 
 Shared estimate_shared(const std::vector<RobotFit>& fits, const VectorXd& prior, int skipped) {
   const Index p = prior.size();
-  Shared at;
-  at.between = prior;
-  for (int round = 0; round < kSharedRounds; ++round) {
-    MatrixXd N = MatrixXd::Zero(p, p);
-    VectorXd b = VectorXd::Zero(p);
-    std::vector<MatrixXd> weights(fits.size());
-    for (std::size_t u = 0; u < fits.size(); ++u) {
-      if (static_cast<int>(u) == skipped) continue;
-      MatrixXd V = fits[u].covariance.topLeftCorner(p, p);
-      V.diagonal() += at.between;
-      weights[u] = inverse(V);
-      N += weights[u];
-      b += weights[u] * fits[u].beta.head(p);
-    }
-    at.covariance = inverse(N);
-    at.mean = at.covariance * b;
-    VectorXd between = kPriorRobots * prior;
-    double robots = kPriorRobots;
-    for (std::size_t u = 0; u < fits.size(); ++u) {
-      if (static_cast<int>(u) == skipped) continue;
-      const MatrixXd rest = weights[u] - weights[u] * at.covariance * weights[u];
-      const VectorXd w = at.between.cwiseProduct(weights[u] * (fits[u].beta.head(p) - at.mean));
-      between += w.cwiseProduct(w) + at.between -
-                 at.between.cwiseProduct(at.between).cwiseProduct(rest.diagonal());
-      robots += 1;
-    }
-    at.between = between / robots;
+  std::vector<RobotRuns> robots(1);
+  for (std::size_t u = 0; u < fits.size(); ++u) {
+    if (static_cast<int>(u) == skipped) continue;
+    robots[0].values.emplace_back(fits[u].beta.head(p));
+    robots[0].covariances.emplace_back(fits[u].covariance.topLeftCorner(p, p));
   }
-  return at;
+  robots[0].weights.assign(robots[0].values.size(), 1);
+  RunVariances variances{1, prior};
+  estimate_variances(&robots, &variances, kSharedRounds);
+  const RobotFit fit = fit_robot(robots[0], variances);
+  return {fit.beta, fit.covariance, variances.between};
 }
 
 double threshold_of(const std::vector<double>& maxima, double alarms) {

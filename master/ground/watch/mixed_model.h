@@ -24,6 +24,7 @@ struct RobotRuns {
 struct RunVariances {
   double dispersion = 1;    // of the covariances
   Eigen::VectorXd between;  // from run to run, beside them
+  Eigen::VectorXd prior = between;
 };
 
 // One robot by generalised least squares.
@@ -38,7 +39,7 @@ RobotFit fit_robot(const RobotRuns& robot, const RunVariances& variances);
 
 // Maximum a posteriori by EM, from where both stand: runs scatter with Student's density of
 // kRunTail degrees of freedom, whose weights are left in the robots; restricted likelihood, a prior
-// of a few runs that differ by a tolerance and, of the dispersion, of 1.
+// of a few runs and, of the dispersion, of 1.
 void estimate_variances(std::vector<RobotRuns>* robots, RunVariances* at, int rounds);
 inline constexpr double kRunTail = 6;
 
@@ -55,7 +56,7 @@ std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const Robot
                                                 const std::vector<Eigen::VectorXd>& directions,
                                                 std::size_t length = 0);
 
-// What robots share, and differ by: a random effect a row.
+// What robots share, and differ by, as runs of one robot do.
 struct Shared {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;  // of the mean
