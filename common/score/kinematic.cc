@@ -48,6 +48,27 @@ Kinematics nominal_kinematics(const GroundRobot& robot) {
   return k;
 }
 
+Eigen::Matrix2Xd asked_by_channels(const GroundRobot& robot) {
+  const double half_m = robot.controller.wheel_separation_m.value_or(0) / 2;
+  Eigen::Matrix2Xd asked =
+      Eigen::Matrix2Xd::Zero(2, static_cast<Eigen::Index>(robot.channels.size()));
+  const RobotWheel* wheel = driven_wheel(robot);
+  double sides = 0;
+  for (Eigen::Index c = 0; c < asked.cols(); ++c) {
+    const std::string& name = robot.channels[static_cast<std::size_t>(c)];
+    const bool left = name.find("left") != name.npos, right = name.find("right") != name.npos;
+    if (robot.command == CommandKind::kTwist) {
+      asked.col(c) << (name == "v" ? 1 : 0), (name == "omega" ? half_m : 0);
+    } else if (robot.command == CommandKind::kWheelSpeeds && wheel != nullptr && (left || right)) {
+      asked.col(c) << *wheel->radius_m, (left ? -1 : 1) * *wheel->radius_m;
+      sides += 1;
+    }
+  }
+  const bool known = half_m > 0 && !is_steered(robot) && !is_holonomic(robot);
+  if (!known || asked.row(1).isZero()) return Eigen::Matrix2Xd(2, 0);
+  return asked / std::max(sides, 1.0);
+}
+
 GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics) {
   return KinematicBody(robot, kinematics).corrected();
 }

@@ -36,6 +36,10 @@ bool is_magnitude(std::string_view name);
 // As the robot's file has it: gains 1, its delay, lag and marker.
 Kinematics nominal_kinematics(const GroundRobot& robot);
 
+// What a unit of each channel asks of a robot, m/s: ahead, and of the rims in a turn, half the
+// wheels' separation from the middle.  No columns: not commanded by twists or by two sides.
+Eigen::Matrix2Xd asked_by_channels(const GroundRobot& robot);
+
 // The measured end pose that the kinematics expect of every trial.  REQUIRES: a problem with a
 // robot whose trials are windows.
 std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinematics);
@@ -59,7 +63,10 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // "patch_ratio": the same within a circle; "known_" before these names: of a second edge and
 // circle; "downhill_x" and "_y" (of the tracker's frame): how much farther than its wheels' way a
 // robot goes downhill, over how far they roll; of robots that skid over how far turns drag their
-// wheels; of a throttle the slope, sin(angle), by which gravity drives it.
+// wheels; of a throttle the slope, sin(angle), by which gravity drives it; "ahead_by_turn",
+// "_by_side" and "_by_turn_speed" with "turn_by_turn" and so on (shares, of asked_by_channels()):
+// what a commanded turn adds to the speed ahead and of the rims, over the speed ahead, the same to
+// the left and less to the right, and the speed of the rims.
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
                                  std::span<const Trial> trials, const Kinematics& kinematics);
 

@@ -10,6 +10,7 @@ namespace gapfarm {
 KinematicBody::KinematicBody(const GroundRobot& robot, const Kinematics& at)
     : robot_(robot),
       load_(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0)),
+      asked_(asked_by_channels(robot)),
       floor_(at.origin_m),
       reach_m_(wheel_reach_m(robot)) {
   for (std::size_t i = 0; i < at.names.size(); ++i) {
@@ -61,11 +62,12 @@ GroundRobot KinematicBody::corrected() const {
 
 std::span<const CommandRow> KinematicBody::taken(std::span<const CommandRow> logged, double began_s,
                                                  std::vector<CommandRow>* changed) const {
-  if (sag_ == 0 && drift_ == 0 && rate_ == 0) return logged;
+  if (sag_ == 0 && drift_ == 0 && rate_ == 0 && offsets_.isZero(0)) return logged;
   std::vector<CommandRow>& rows = *changed;
   rows.assign(logged.begin(), logged.end());
   const bool throttled = is_throttled(robot_);
   for (CommandRow& row : rows) {
+    add_offsets(&row.values);
     const double left = std::max(0.0, 1 - sag_ * (row.t_s - began_s) / 60);
     for (std::size_t c = 0; c < row.values.size(); ++c) {
       const bool power = robot_.channels[c] != "steering";
@@ -75,6 +77,17 @@ std::span<const CommandRow> KinematicBody::taken(std::span<const CommandRow> log
     row.t_s += (drift_ + rate_) * (row.t_s - began_s);
   }
   return rows;
+}
+
+void KinematicBody::add_offsets(std::vector<double>* command) const {
+  if (asked_.cols() == 0) return;
+  Eigen::Map<Eigen::VectorXd> values(command->data(), asked_.cols());
+  const Eigen::Vector2d asked = asked_ * values;
+  if (asked[1] == 0) return;
+  const Eigen::Vector3d by(asked[0], std::copysign(asked[0], asked[0] * asked[1]),
+                           std::abs(asked[1]));
+  // Its rows are at right angles.
+  values += asked_.transpose() * (offsets_ * by).cwiseQuotient(asked_.rowwise().squaredNorm());
 }
 
 FloorForces KinematicBody::forces(const RobotPlace* at) const {
@@ -188,6 +201,11 @@ void KinematicBody::put(const std::string& name, double value) {
   if (name == "cornering") t.cornering = value;
   if (name == "lag") robot_.motors.lag_s = value;
   if (name == "delay") robot_.motors.delay_s = value;
+  constexpr const char* kBy[] = {"_by_turn", "_by_side", "_by_turn_speed"};
+  for (Eigen::Index k = 0; k < offsets_.cols(); ++k) {
+    if (name == std::string("ahead") + kBy[k]) offsets_(0, k) = value;
+    if (name == std::string("turn") + kBy[k]) offsets_(1, k) = value;
+  }
   if (name == "marker_x") robot_.X_RM.x = value;
   if (name == "marker_y") robot_.X_RM.y = value;
   if (name == "marker_yaw") robot_.X_RM.theta = value;

@@ -29,7 +29,8 @@ class KinematicBody {
   Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
 
   // The commands as this robot takes them: later by a clock that drifts, slower where that is its
-  // own, weaker by a battery that sags; from `began_s` on.  In `changed` unless they are the log's.
+  // own, weaker by a battery that sags, with what turns add; from `began_s` on.  In `changed`
+  // unless they are the log's.
   std::span<const CommandRow> taken(std::span<const CommandRow> logged, double began_s,
                                     std::vector<CommandRow>* changed) const;
 
@@ -55,6 +56,7 @@ class KinematicBody {
   // The tractions of omni and mecanum wheels there.
   void stand_on(const RobotPlace& at) const;
   void put(const std::string& name, double value);
+  void add_offsets(std::vector<double>* command) const;
   // A wheel of radius r at x, y drives ahead by r, aside by r / tan(roller angle), and turns the
   // robot by r / (y + x tan(roller angle)), or by r / robot_radius where wheels stand across.
   void correct_arms(GroundRobot* robot) const;
@@ -65,6 +67,9 @@ class KinematicBody {
   double travel_ = 1, traction_ = 1;  // of holonomic robots
   Eigen::Vector2d load_;              // where the weight stands on their wheels
   double sag_ = 0, drift_ = 0, rate_ = 0, scale_ = 1, aspect_ = 1;
+  // Of the speeds ahead and of the rims, what turns add: "_by_turn", "_by_side", "_by_turn_speed".
+  Eigen::Matrix<double, 2, 3> offsets_ = Eigen::Matrix<double, 2, 3>::Zero();
+  Eigen::Matrix2Xd asked_;
   FloorParts floor_;
   Eigen::Vector2d downhill_ = Eigen::Vector2d::Zero();  // in the tracker's frame
   double reach_m_;

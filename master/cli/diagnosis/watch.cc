@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFittedRuns = "runs.jsonl";
 constexpr const char* kRobotFile = "robot.toml";
-constexpr const char* kFitVersion = "2";  // of fit_run_values(): what it gave before is made anew
+constexpr const char* kFitVersion = "3";  // of fit_run_values(): what it gave before is made anew
 constexpr double kEpoch_s = 1e8;          // times from here on are those of a calendar's clock
 
 struct WatchCommand {

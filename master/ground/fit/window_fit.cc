@@ -14,15 +14,20 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kSteps = 6;            // of Gauss and Newton a round
-constexpr double kStepShare = 0.05;  // of a row's tolerance: to find slopes
-constexpr double kFaster = 0.02;     // to find how ends move with speed
-constexpr double kEnough = 1e-3;     // nats a step
+constexpr int kSteps = 6;                            // of Gauss and Newton a round
+constexpr double kStepShare = 0.05;                  // of a row's tolerance: to find slopes
+constexpr double kFaster = 0.02;                     // to find how ends move with speed
+constexpr double kEnough = 1e-3;                     // nats a step
+constexpr double kGaussian = 1.4826, kOfTail = 1.3;  // of a median deviation
 
-double robust_deviation(std::vector<double>* sizes) {
+constexpr double kLeastWindowScale = 1e-5;  // m, rad
+
+// So many times the middle one.
+double robust_scale(std::vector<double>* sizes, double times) {
+  if (sizes->empty()) return kLeastWindowScale;
   const auto middle = sizes->begin() + static_cast<long>(sizes->size() / 2);
   std::nth_element(sizes->begin(), middle, sizes->end());
-  return std::max(1.4826 * *middle, 1e-5);
+  return std::max(times * *middle, kLeastWindowScale);
 }
 
 }  // namespace
@@ -71,8 +76,9 @@ WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
 
 void WindowFitter::shape_by_speed() {
   const std::vector<FitRow> rows = {{{"ahead", 1, 0.02, "ratio", "-"}, false}};
-  const auto here = residuals(rows, Eigen::VectorXd::Constant(1, 1.0));
-  const auto faster = residuals(rows, Eigen::VectorXd::Constant(1, 1 + kFaster));
+  const auto both = residuals(
+      rows, {Eigen::VectorXd::Constant(1, 1.0), Eigen::VectorXd::Constant(1, 1 + kFaster)});
+  const auto &here = both[0], &faster = both[1];
   const auto n = static_cast<std::size_t>(windows_.horizons);
   std::vector<Eigen::Vector3d> shifts(here.size());
   std::vector<std::vector<double>> shares(n), rests(3 * n);
@@ -91,9 +97,9 @@ void WindowFitter::shape_by_speed() {
     const auto h = static_cast<std::size_t>(windows_.horizon[i]);
     Eigen::Vector3d s;
     for (std::size_t c = 0; c < 3; ++c) {
-      s[static_cast<Eigen::Index>(c)] = robust_deviation(&rests[3 * h + c]);
+      s[static_cast<Eigen::Index>(c)] = robust_scale(&rests[3 * h + c], kGaussian);
     }
-    const Eigen::Vector3d d = robust_deviation(&shares[h]) * shifts[i].cwiseQuotient(s);
+    const Eigen::Vector3d d = robust_scale(&shares[h], kGaussian) * shifts[i].cwiseQuotient(s);
     // (1 + d d')^-1/2 in units of s.
     const double square = d.squaredNorm();
     Eigen::Matrix3d root = Eigen::Matrix3d::Identity();
@@ -119,11 +125,14 @@ Kinematics WindowFitter::kinematics(const std::vector<FitRow>& rows,
   return at;
 }
 
-std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& rows,
-                                                     const Eigen::VectorXd& values) const {
-  const Kinematics at = kinematics(rows, values);
-  if (windows_.simulated) return residuals(at, windows_.simulated({at}).front());
-  return residuals(at, paths_.ends(robot_, at));
+std::vector<std::vector<Eigen::Vector3d>> WindowFitter::residuals(
+    const std::vector<FitRow>& rows, const std::vector<Eigen::VectorXd>& points) const {
+  const auto at = mapped(points, [&](const auto& values) { return kinematics(rows, values); });
+  const auto by_robot = [&](const Kinematics& k) { return paths_.ends(robot_, k); };
+  const auto ends = windows_.simulated ? windows_.simulated(at) : mapped(at, by_robot);
+  std::vector<std::vector<Eigen::Vector3d>> all;
+  for (std::size_t k = 0; k < at.size(); ++k) all.push_back(residuals(at[k], ends[k]));
+  return all;
 }
 
 std::vector<Eigen::Vector3d> WindowFitter::residuals(const Kinematics& at,
@@ -187,12 +196,9 @@ void WindowFitter::rescale(WindowFit* fit, const std::vector<double>& use) const
         sizes[3 * h + c].push_back(std::abs(fit->residuals[i][static_cast<Eigen::Index>(c)]));
       }
     }
-    fit->scales.assign(n, Eigen::Vector3d::Constant(1e-5));
+    fit->scales.resize(n);
     for (std::size_t k = 0; k < sizes.size(); ++k) {
-      if (sizes[k].empty()) continue;
-      const auto middle = sizes[k].begin() + static_cast<long>(sizes[k].size() / 2);
-      std::nth_element(sizes[k].begin(), middle, sizes[k].end());
-      fit->scales[k / 3][static_cast<Eigen::Index>(k % 3)] = std::max(1.3 * *middle, 1e-5);
+      fit->scales[k / 3][static_cast<Eigen::Index>(k % 3)] = robust_scale(&sizes[k], kOfTail);
     }
   }
   for (int round = 0; round < 20; ++round) {
@@ -210,7 +216,7 @@ void WindowFitter::rescale(WindowFit* fit, const std::vector<double>& use) const
     for (std::size_t h = 0; h < n; ++h) {
       if (counts[h] == 0) continue;
       for (Eigen::Index c = 0; c < 3; ++c) {
-        fit->scales[h][c] = std::max(std::sqrt(sums[h][c] / counts[h]), 1e-5);
+        fit->scales[h][c] = std::max(std::sqrt(sums[h][c] / counts[h]), kLeastWindowScale);
       }
     }
   }
@@ -239,28 +245,17 @@ double WindowFitter::score(WindowFit* fit, const std::vector<double>& use) const
 
 void WindowFitter::add_slopes(const WindowFit& fit, Eigen::Index first,
                               std::vector<Eigen::MatrixXd>* J) const {
-  const auto step = [&](Eigen::Index k) {
-    return kStepShare * fit.rows[static_cast<std::size_t>(k)].row.tolerance;
-  };
-  const auto moved = [&](Eigen::Index k) {
-    Eigen::VectorXd values = fit.values;
-    values[k] += step(k);
-    return values;
-  };
-  std::vector<std::vector<Pose>> ends;  // of a simulation, all at once
-  if (windows_.simulated) {
-    std::vector<Kinematics> points;
-    for (Eigen::Index k = first; k < fit.values.size(); ++k) {
-      points.push_back(kinematics(fit.rows, moved(k)));
-    }
-    ends = windows_.simulated(points);
-  }
+  std::vector<double> steps;
+  std::vector<Eigen::VectorXd> points;
   for (Eigen::Index k = first; k < fit.values.size(); ++k) {
-    const auto r = windows_.simulated ? residuals(kinematics(fit.rows, moved(k)),
-                                                  ends[static_cast<std::size_t>(k - first)])
-                                      : residuals(fit.rows, moved(k));
-    for (std::size_t i = 0; i < r.size(); ++i) {
-      (*J)[i].col(k) = (r[i] - fit.residuals[i]) / step(k);
+    steps.push_back(kStepShare * fit.rows[static_cast<std::size_t>(k)].row.tolerance);
+    points.emplace_back(fit.values)[k] += steps.back();
+  }
+  const auto moved = residuals(fit.rows, points);
+  for (std::size_t j = 0; j < moved.size(); ++j) {
+    for (std::size_t i = 0; i < J->size(); ++i) {
+      (*J)[i].col(first + static_cast<Eigen::Index>(j)) =
+          (moved[j][i] - fit.residuals[i]) / steps[j];
     }
   }
 }
@@ -271,24 +266,29 @@ std::vector<Eigen::MatrixXd> WindowFitter::slopes(const WindowFit& fit) const {
   return J;
 }
 
-void WindowFitter::normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
-                                    const std::vector<double>& use, Eigen::MatrixXd* H,
-                                    Eigen::VectorXd* g) const {
+void WindowFitter::Equations::add(const Eigen::RowVectorXd& slope, double residual, double weight,
+                                  double curvature) {
+  H += weight * curvature * slope.transpose() * slope;
+  g += weight * slope.transpose() * residual;
+}
+
+WindowFitter::Equations WindowFitter::normal_equations(const WindowFit& fit,
+                                                       const std::vector<Eigen::MatrixXd>& J,
+                                                       const std::vector<double>& use) const {
   const Eigen::Index n = fit.values.size();
-  *H = Eigen::MatrixXd::Zero(n, n);
-  *g = Eigen::VectorXd::Zero(n);
+  Equations equations{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
   for (std::size_t i = 0; i < use.size(); ++i) {
     if (use[i] == 0) continue;
     const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
     for (Eigen::Index c = 0; c < 3; ++c) {
-      const double w = use[i] * window_weight(fit.residuals[i][c], s[c]);
-      *H += w * J[i].row(c).transpose() * J[i].row(c);
-      *g += w * J[i].row(c).transpose() * fit.residuals[i][c];
+      const double r = fit.residuals[i][c];
+      equations.add(J[i].row(c), r, use[i] * window_weight(r, s[c]));
     }
   }
   const Eigen::MatrixXd P = prior_precision(fit.rows);
-  *H += P;
-  *g += P * (fit.values - nominals(fit.rows));
+  equations.H += P;
+  equations.g += P * (fit.values - nominals(fit.rows));
+  return equations;
 }
 
 double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,
@@ -299,9 +299,7 @@ double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::Matr
   std::vector<Eigen::MatrixXd> J(fit_slopes.size(), Eigen::MatrixXd(3, values.size()));
   for (std::size_t i = 0; i < J.size(); ++i) J[i].leftCols(fit.values.size()) = fit_slopes[i];
   add_slopes(moved, fit.values.size(), &J);
-  Eigen::MatrixXd H;
-  Eigen::VectorXd g;
-  normal_equations(moved, J, uses({}), &H, &g);
+  const auto [H, g] = normal_equations(moved, J, uses({}));
   return prior(moved) - prior(fit) + g.dot(solve_symmetric(H, g)) / 2;
 }
 
@@ -321,16 +319,14 @@ Eigen::VectorXd stepped(const WindowFit& fit, const Eigen::MatrixXd& H, const Ei
 
 bool WindowFitter::step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J,
                         const std::vector<double>& use, double* damping) const {
-  Eigen::MatrixXd H;
-  Eigen::VectorXd g;
-  normal_equations(*fit, J, use, &H, &g);
+  const auto [H, g] = normal_equations(*fit, J, use);
   for (int attempt = 0; attempt < 5; ++attempt) {
     Eigen::MatrixXd damped = H;
     damped.diagonal() *= 1 + *damping;
     WindowFit next = *fit;
     next.values = stepped(*fit, damped, g);
     if (next.values.allFinite()) {
-      next.residuals = residuals(next.rows, next.values);
+      next.residuals = std::move(residuals(next.rows, {next.values}).front());
       if (score(&next, use) > fit->objective) {
         const double gained = next.objective - fit->objective;
         *fit = std::move(next);
@@ -390,7 +386,7 @@ WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<c
 
 WindowFit WindowFitter::standing(const std::vector<FitRow>& rows, const KeptFit& kept,
                                  const std::vector<double>& use) const {
-  WindowFit fit{rows, kept.values, kept.scales, residuals(rows, kept.values), {}};
+  WindowFit fit{rows, kept.values, kept.scales, residuals(rows, {kept.values}).front(), {}};
   if (kept.scales.empty()) rescale(&fit, use);
   score(&fit, use);
   return fit;

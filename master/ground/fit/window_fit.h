@@ -163,8 +163,9 @@ class WindowFitter {
   std::vector<EndedWindow> ended_windows(const WindowFit& fit) const;
 
  private:
-  std::vector<Eigen::Vector3d> residuals(const std::vector<FitRow>& rows,
-                                         const Eigen::VectorXd& values) const;
+  // Of every window, at each of some values.
+  std::vector<std::vector<Eigen::Vector3d>> residuals(
+      const std::vector<FitRow>& rows, const std::vector<Eigen::VectorXd>& points) const;
   std::vector<Eigen::Vector3d> residuals(const Kinematics& at, const std::vector<Pose>& ends) const;
   // Of the rows and the reference.
   Kinematics kinematics(const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
@@ -172,10 +173,17 @@ class WindowFitter {
   double score(WindowFit* fit, const std::vector<double>& use) const;
   // The columns of slopes that belong to rows from `first` on.
   void add_slopes(const WindowFit& fit, Eigen::Index first, std::vector<Eigen::MatrixXd>* J) const;
-  // Equations of one step: weighted squares of slopes, and of slopes with residuals, priors in.
-  void normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
-                        const std::vector<double>& use, Eigen::MatrixXd* H,
-                        Eigen::VectorXd* g) const;
+  // Of one step: squares of slopes, and slopes with residuals, weighted.
+  struct Equations {
+    Eigen::MatrixXd H;
+    Eigen::VectorXd g;
+    void add(const Eigen::RowVectorXd& slope, double residual, double weight, double curvature = 1);
+  };
+  // Priors in.
+  Equations normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
+                             const std::vector<double>& use) const;
+  // Of each block, without priors; H as the density curves.
+  std::vector<Equations> equations_of_blocks(const WindowFit& fit) const;
   // With slopes of a fit nearby.
   bool step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J, const std::vector<double>& use,
             double* damping) const;
@@ -193,10 +201,11 @@ class WindowFitter {
 
   void shape_by_speed();
   std::vector<Eigen::Matrix3d> noise_shapes(double least) const;
+  // Nats of a fit's residuals (`raw`: as they are) under such shapes, with scales of their own.
+  double nats_shaped(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+                     const std::vector<Eigen::Matrix3d>& shapes) const;
   void take_biases_out(std::vector<Eigen::Vector3d>* r) const;
   void weigh_by_commands(const WindowFit& fit);
-  // How residuals change with command_offsets(), a column each.
-  std::vector<Eigen::MatrixXd> offset_slopes(const WindowFit& fit) const;
 
   const GroundRobot& robot_;
   const WindowSet& windows_;

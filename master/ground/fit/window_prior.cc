@@ -125,24 +125,26 @@ std::vector<Eigen::Vector3d> WindowFitter::curvature_shares(const WindowFit& fit
   return curvatures;
 }
 
-Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bool all) const {
+std::vector<WindowFitter::Equations> WindowFitter::equations_of_blocks(const WindowFit& fit) const {
   const Eigen::Index n = fit.values.size();
-  const auto blocks = static_cast<std::size_t>(windows_.blocks);
   const std::vector<double> use = uses({});
   const std::vector<Eigen::MatrixXd> J = slopes(fit);
-  std::vector<Eigen::MatrixXd> H(blocks, Eigen::MatrixXd::Zero(n, n));
-  std::vector<Eigen::VectorXd> g(blocks, Eigen::VectorXd::Zero(n));
   const std::vector<Eigen::Vector3d> curvature = curvature_shares(fit);
+  std::vector<Equations> blocks(static_cast<std::size_t>(windows_.blocks),
+                                {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)});
   for (std::size_t i = 0; i < use.size(); ++i) {
-    const auto b = static_cast<std::size_t>(windows_.block[i]);
     const auto h = static_cast<std::size_t>(windows_.horizon[i]);
-    const Eigen::Vector3d& s = fit.scales[h];
     for (Eigen::Index c = 0; c < 3; ++c) {
-      const double w = use[i] * window_weight(fit.residuals[i][c], s[c]);
-      H[b] += w * curvature[h][c] * J[i].row(c).transpose() * J[i].row(c);
-      g[b] += w * J[i].row(c).transpose() * fit.residuals[i][c];
+      const double r = fit.residuals[i][c], w = use[i] * window_weight(r, fit.scales[h][c]);
+      blocks[static_cast<std::size_t>(windows_.block[i])].add(J[i].row(c), r, w, curvature[h][c]);
     }
   }
+  return blocks;
+}
+
+Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bool all) const {
+  const Eigen::Index n = fit.values.size();
+  const std::vector<Equations> blocks = equations_of_blocks(fit);
   const Eigen::MatrixXd P = prior_precision(fit.rows);
   const Eigen::VectorXd away = fit.values - nominals(fit.rows);
   const std::vector<std::vector<double>> all_times = draw_blocks(windows_, seed, 1);
@@ -159,9 +161,9 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bo
     Eigen::MatrixXd A = P;
     Eigen::VectorXd b = P * from;
     const std::vector<double>& times = all_times[d];
-    for (std::size_t k = 0; k < blocks; ++k) {
-      A += times[k] * H[k];
-      b += times[k] * g[k];
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+      A += times[k] * blocks[k].H;
+      b += times[k] * blocks[k].g;
     }
     drawn.col(d) = fit.values - solve_symmetric(A, b);
   }
@@ -224,16 +226,28 @@ std::vector<Eigen::Matrix3d> WindowFitter::noise_shapes(double least) const {
   return shapes;
 }
 
+double WindowFitter::nats_shaped(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+                                 const std::vector<Eigen::Matrix3d>& shapes) const {
+  const std::vector<double> use = uses({});
+  double volumes = 0;
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    fit.residuals[i] = shapes[i] * raw[i];
+    volumes += use[i] * std::log(shapes[i].determinant());
+  }
+  fit.scales.clear();
+  rescale(&fit, use);
+  return score(&fit, use) + volumes;
+}
+
 double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
   double best = windows_.least_noise, most = -INFINITY;
   if (windows_.noise.empty() || shapes_.empty()) return best;
   const std::vector<Eigen::Vector3d> raw = raw_residuals(fit);
-  const std::vector<double> use = uses({});
   // What is stated is this factor too small at most: the rest is not the matcher's.
   WindowFit plain = fit;
   plain.residuals = raw;
   plain.scales.clear();
-  rescale(&plain, use);
+  rescale(&plain, uses({}));
   const std::vector<double> middle = middle_variances(windows_);
   std::vector<double> ratios;
   for (std::size_t k = 0; k < 3 * static_cast<std::size_t>(windows_.lengths); ++k) {
@@ -243,16 +257,7 @@ double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
   const double lowest = median(ratios) - 1;
   for (const double candidate : kLeastNoises) {
     const double least = std::max(candidate, lowest);
-    const std::vector<Eigen::Matrix3d> shapes = noise_shapes(least);
-    WindowFit shaped = fit;
-    shaped.scales.clear();
-    double volumes = 0;
-    for (std::size_t i = 0; i < raw.size(); ++i) {
-      shaped.residuals[i] = shapes[i] * raw[i];
-      volumes += use[i] * std::log(shapes[i].determinant());
-    }
-    rescale(&shaped, use);
-    const double objective = score(&shaped, use) + volumes;
+    const double objective = nats_shaped(fit, raw, noise_shapes(least));
     if (objective <= most) continue;
     most = objective;
     best = least;

@@ -59,5 +59,31 @@ TEST(KinematicPaths, ASteadyMotionIsAnArc) {
   EXPECT_NEAR(X.theta, arc.theta, 1e-12);
 }
 
+// Wheels of 0.05 m, 0.3 m apart: 0.2 m/s ahead and 0.1 m/s of the rims, to the left.
+TEST(KinematicPaths, TurnsAddSharesToWhatIsCommanded) {
+  GroundRobot robot = robot_of(kDifferential);
+  robot.X_RM = {};
+  const auto driven = [&](double left, double right, const char* name, double share) {
+    CommandedRun run;
+    run.commands = {{0, {left, right}}};
+    Trial window;
+    window.run = 0;
+    window.t_s = 0.5;
+    window.duration_s = 1;
+    const Kinematics at = off_by({"lag", name}, {0, share});
+    return log(KinematicPaths({&run, 1}, {&window, 1}).ends(robot, at).front());
+  };
+  const auto expect = [](const Twist& twist, double ahead, double turn) {
+    EXPECT_NEAR(twist[0], ahead, 1e-12);
+    EXPECT_NEAR(twist[2], turn / 0.15, 1e-12);
+  };
+  expect(driven(2, 6, "ahead_by_turn", 0.1), 0.22, 0.1);
+  expect(driven(6, 2, "ahead_by_side", 0.1), 0.18, -0.1);
+  expect(driven(2, 6, "ahead_by_turn_speed", 0.1), 0.21, 0.1);
+  expect(driven(6, 2, "turn_by_turn", 0.1), 0.2, -0.08);
+  expect(driven(6, 2, "turn_by_side", 0.1), 0.2, -0.12);
+  expect(driven(4, 4, "turn_by_turn", 0.1), 0.2, 0);
+}
+
 }  // namespace
 }  // namespace gapfarm
