@@ -10,7 +10,6 @@
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "master/ground/watch/describe_steps.h"
 #include "master/ground/watch/fleet_steps.h"
 #include "master/ground/watch/mixed_model.h"
 #include "master/infer/certificate.h"

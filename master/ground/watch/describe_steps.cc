@@ -1,5 +1,3 @@
-#include "master/ground/watch/describe_steps.h"
-
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -8,6 +6,7 @@
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
+#include "master/ground/watch/fleet_steps.h"
 
 namespace gapfarm {
 namespace {

@@ -1,10 +1,11 @@
-// The steps in a fleet that its runs show best.
+// The steps in a fleet that its runs show best, and what they are and since when.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
 #include <vector>
 
+#include "master/ground/watch/changes.h"
 #include "master/ground/watch/mixed_model.h"
 
 namespace gapfarm {
@@ -51,5 +52,18 @@ std::vector<StepCandidate> best_steps(ScaledFleet* fleet, int rounds, RunVarianc
 // Steps beyond the thresholds, each sought beside the ones before; they are left in the fleet.
 std::vector<StepCandidate> add_steps_beyond(const std::vector<double>& thresholds,
                                             ScaledFleet* fleet, RunVariances* variances);
+
+// What a ScaledFleet counts in.
+Eigen::VectorXd tolerances_of(const WatchedRows& rows);
+
+// Of a value what these values of a run are, all others its robot's own.
+double value_at(const WatchedRows& rows, std::size_t value, const Eigen::VectorXd& values);
+
+std::vector<RobotFit> fit_robots(const ScaledFleet& fleet, const RunVariances& variances);
+
+// Steps as all that was found describes them, each beside the others.
+std::vector<ValueStep> describe_steps(const WatchedRows& rows, const ScaledFleet& fleet,
+                                      const RunVariances& variances,
+                                      const std::vector<StepCandidate>& found);
 
 }  // namespace gapfarm

@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
+#include "common/json/fields.h"
 #include "common/math/laws.h"
 #include "master/ground/watch/mixed_model.h"
 #include "master/report/figures/line_chart.h"
@@ -25,9 +27,7 @@ std::string change_text(const WatchedValue& value, double change, double lo, dou
 
 std::string names_of(const WatchedFleet& fleet, const std::vector<std::size_t>& robots) {
   if (robots.size() > 1 && robots.size() == fleet.robots.size()) return "all robots";
-  std::string names;
-  for (const std::size_t u : robots) names += (names.empty() ? "" : ", ") + fleet.robots[u].name;
-  return names;
+  return joined(robots, ", ", [&](std::size_t u) { return fleet.robots[u].name; });
 }
 
 // Of one finding: robot, since when, between which runs, what, by how much, how sure.
@@ -150,6 +150,8 @@ std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes) {
 
 namespace {
 
+constexpr auto kChange = [](auto& v, auto& row) { FIELDS(change, lo, hi, statistic); };
+
 Json value_json(const WatchedFleet& fleet, std::size_t robot, std::size_t value) {
   const WatchedValue& watched = fleet.rows.values[value];
   return {{"robot", fleet.robots[robot].name},
@@ -168,11 +170,8 @@ Json steps_json(const WatchedFleet& fleet, const FleetChanges& changes) {
     json.update({{"onset", runs[step.onset]},
                  {"onset_first", runs[step.onset_first]},
                  {"onset_last", runs[step.onset_last]},
-                 {"onset_number", step.onset + 1},
-                 {"change", step.change},
-                 {"lo", step.lo},
-                 {"hi", step.hi},
-                 {"statistic", step.statistic}});
+                 {"onset_number", step.onset + 1}});
+    json.update(FieldWriter::written(step, kChange));
     for (std::size_t k = 0; k < step.shares.size(); ++k) {
       json["chances"][fleet.rows.values[k].value] = step.shares[k];
     }
@@ -225,19 +224,15 @@ Json robots_json(const WatchedFleet& fleet, const FleetChanges& changes) {
 }  // namespace
 
 Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
-  Json odd_robots = Json::array(), odd_runs = Json::array(), skipped = Json::array();
+  Json odd_robots = Json::array(), odd_runs = Json::array();
   for (const OddRobot& odd : changes.odd_robots) {
     odd_robots.push_back(value_json(fleet, odd.robot, odd.value));
-    odd_robots.back().update(
-        {{"change", odd.change}, {"lo", odd.lo}, {"hi", odd.hi}, {"statistic", odd.statistic}});
+    odd_robots.back().update(FieldWriter::written(odd, kChange));
   }
   for (const OddRun& odd : changes.odd_runs) {
     odd_runs.push_back({{"robot", fleet.robots[odd.robot].name},
                         {"run", fleet.robots[odd.robot].runs[odd.run]},
                         {"weight", odd.weight}});
-  }
-  for (const WatchedSkip& skip : fleet.skipped) {
-    skipped.push_back({{"robot", skip.robot}, {"run", skip.run}, {"why", skip.why}});
   }
   Json thresholds = {{"robot", changes.thresholds.robot}};
   for (std::size_t k = 0; k < fleet.rows.values.size(); ++k) {
@@ -249,7 +244,8 @@ Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
           {"steps", steps_json(fleet, changes)},
           {"odd_robots", odd_robots},
           {"odd_runs", odd_runs},
-          {"skipped", skipped},
+          {"skipped",
+           FieldWriter::list(fleet.skipped, [](auto& v, auto& row) { FIELDS(robot, run, why); })},
           {"false_alarms", changes.thresholds.false_alarms},
           {"thresholds", thresholds},
           {"dispersion", changes.dispersion},
