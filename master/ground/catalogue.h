@@ -12,6 +12,15 @@
 
 namespace gapfarm {
 
+// Two floors in one log: beyond an edge, or within a patch, a wheel travels less far, or farther
+// (common/score/floor_parts.h).
+GroundHypothesis floor_edge();
+GroundHypothesis friction_patch();
+
+// A floor that is not level: the robot goes farther than its wheels downhill, and less far uphill;
+// a throttle is driven by its weight (common/score/kinematic.h).
+GroundHypothesis floor_tilt();
+
 class Catalogue {
  public:
   Catalogue(const GroundRobot& robot, std::vector<KinematicRow> rows)
@@ -19,6 +28,7 @@ class Catalogue {
 
   void wrong_commands();
   void wrong_poses();
+  void wrong_sides_of_poses();
   void wrong_increments();
   void sizes();
   void all_sizes();

@@ -8,8 +8,6 @@
 #include "master/ground/catalogue.h"
 #include "master/ground/fit/scans.h"
 #include "master/ground/fit/window_set.h"
-#include "master/ground/floor/regions.h"
-#include "master/ground/floor/tilt.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -24,12 +22,8 @@ auto from_scan(Eigen::VectorXd (*scan)(const WindowFitter&, const std::vector<Fi
 
 // Where there is none of it there is no slope to it either.
 void only_more(GroundHypothesis& hypothesis) {
-  hypothesis.only_more = true;
-  const std::string name = hypothesis.freed.front().name;
-  hypothesis.propose = [name](const WindowFitter& fitter, const WindowFit&,
-                              const std::vector<FitRow>& rows, const Eigen::VectorXd& values) {
-    return scan_size(fitter, rows, values, row_index(rows, name));
-  };
+  hypothesis.freed.front().positive = true;
+  hypothesis.propose = from_scan(scan_size);
 }
 
 }  // namespace
@@ -114,14 +108,13 @@ void Catalogue::motors() {
   }
   if (!robot_.measured) {
     const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
-    only_more(
-        value("motor_deadband", {}, "commands that move nothing",
-              {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}}));
+    only_more(value("motor_deadband", {}, "commands that move nothing",
+                    {{"dead_band", robot_.motors.dead_band, band, "width", "of the command"}}));
   }
   const auto& limit = robot_.motors.acceleration_limit_m_s2;
   if (robot_.measured && !limit) return;
   only_more(value("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
-                  {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m", true}}));
+                  {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m"}}));
 }
 
 void Catalogue::marker() {

@@ -43,7 +43,6 @@ struct GroundHypothesis {
   std::function<void(RunLog*)> put_right = {};
   double metres = 1;  // logged positions times this are metres
   std::string remedy = {};
-  bool only_more = false;      // less than 0 has no meaning
   double price = 0;            // nats that it must gain more, having more values than others
   bool of_world = false;       // acts in a place or along an axis of the world
   bool of_increments = false;  // of relative poses alone

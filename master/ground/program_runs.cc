@@ -11,7 +11,6 @@
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "master/ground/catalogue.h"
-#include "master/ground/put_right.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
 
@@ -308,11 +307,7 @@ Result<std::optional<SanityFinding>> check_program_log(Farm& farm, const Problem
   Catalogue faults(robot, {});
   faults.wrong_poses();
   // Of commands, but seen as well without another run of the program.
-  faults.fault("sides_swapped", {"command_sign"}, "the side to which it turns",
-               "Exchange left and right in the commands, or mirror the poses.",
-               change_poses(Eigen::Vector3d(1, -1, -1).asDiagonal()));
-  faults.fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
-               "Turn the sign of x.", change_poses(Eigen::Vector3d(-1, 1, 1).asDiagonal()));
+  faults.wrong_sides_of_poses();
   std::erase_if(faults.all,
                 [](const GroundHypothesis& h) { return h.metres > kUntuned && h.metres < 1; });
   GroundQuestion question;

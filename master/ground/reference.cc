@@ -82,8 +82,7 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
       if (fitter.promise(fit, slopes, rows, values) < kLeastPromise) continue;
       WindowFit with = fitter.fit(rows, {}, values);
       const double gain = gain_of(fitter, h, with, fit);
-      const bool less = with.values[values.size() - 1] < rows.back().row.nominal;
-      if (gain < kLeastChangeGain || (h.only_more && less)) continue;
+      if (gain < kLeastChangeGain) continue;
       traits.emplace_back(gain, std::move(with));
     }
     std::ranges::stable_sort(traits, std::greater(), &std::pair<double, WindowFit>::first);

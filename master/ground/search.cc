@@ -32,9 +32,6 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
   offer.values.resize(hypothesis.freed.size());
   for (std::size_t k = 0; k < hypothesis.freed.size(); ++k) {
     offer.values[k] = fit->values[row_index(rows, hypothesis.freed[k].name)];
-    if (hypothesis.only_more && hypothesis.freed[k].nominal == 0 && offer.values[k] < 0) {
-      offer.gain = 0;
-    }
   }
   return offer;
 }

@@ -1,16 +1,82 @@
 // Logs that are the wrong way round, or in another unit.
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "common/base/ranges.h"
 #include "master/ground/catalogue.h"
-#include "master/ground/put_right.h"
 
 namespace gapfarm {
 namespace {
 
 using std::numbers::pi;
+
+using PutRight = std::function<void(RunLog*)>;
+
+constexpr double kMostTimes = 10'000;  // a run's clock may have been set in between
+
+// Changes the values of every row of commands.
+PutRight change_commands(std::function<void(std::vector<double>&)> change) {
+  return [change = std::move(change)](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      for (CommandRow& row : run.commands) change(row.values);
+    }
+  };
+}
+
+// The poses of a relative log, each anew from the new one before it and the increment as logged.
+PutRight change_increments(std::function<Pose(const Pose& before, const Pose& increment)> next) {
+  return [next = std::move(next)](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      Pose before, after;
+      for (PoseRow& row : run.poses) {
+        after = next(after, between(before, row.X_WM));
+        before = std::exchange(row.X_WM, after);
+      }
+    }
+  };
+}
+
+// L (x, y, theta), the heading `turn` (rad) less; of relative poses L of each increment, whose
+// noise goes with it.
+PutRight change_poses(const Eigen::Matrix3d& L, double turn = 0) {
+  const auto changed = [L, turn](const Pose& X) {
+    const Eigen::Vector3d v = L * Eigen::Vector3d(X.x, X.y, X.theta);
+    return Pose{v[0], v[1], turn == 0 ? v[2] : wrap_angle(v[2] - turn)};
+  };
+  const auto chained = change_increments(
+      [changed](const Pose& before, const Pose& X) { return before * changed(X); });
+  return [L, changed, chained](RunLog* log) {
+    if (log->relative) chained(log);
+    for (LoggedRun& run : log->runs) {
+      for (PoseRow& row : run.poses) {
+        if (!log->relative) row.X_WM = changed(row.X_WM);
+        if (row.noise) *row.noise = (L * *row.noise * L.transpose()).eval();
+      }
+    }
+  };
+}
+
+// Repeats each command every `step_s`, until the next or the last pose, as its sender did.
+PutRight hold_commands(double step_s) {
+  return [step_s](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      std::vector<CommandRow> held;
+      for (std::size_t i = 0; i < run.commands.size(); ++i) {
+        const CommandRow& row = run.commands[i];
+        const double last_s = run.poses.empty() ? row.t_s : run.poses.back().t_s;
+        const double end_s = i + 1 < run.commands.size() ? run.commands[i + 1].t_s : last_s;
+        const double times = std::clamp((end_s - row.t_s) / step_s, 0.0, kMostTimes);
+        for (int k = 0; k <= times; ++k) held.push_back({row.t_s + k * step_s, row.values});
+      }
+      run.commands = std::move(held);
+    }
+  };
+}
 
 using ChannelPairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
@@ -36,8 +102,7 @@ auto swap_commands(ChannelPairs pairs) {
 }
 
 // Of the channels where `of` is set; none of a log in which they are all within `beyond`.
-std::function<void(RunLog*)> scale_commands(const std::vector<bool>& of, double factor,
-                                            double beyond) {
+PutRight scale_commands(const std::vector<bool>& of, double factor, double beyond) {
   return [of, factor, beyond](RunLog* log) {
     double most = 0;
     const auto each = [&](const std::function<void(double&)>& visit) {
@@ -148,48 +213,75 @@ void Catalogue::wrong_commands() {
   }
 }
 
+namespace {
+
+// Poses that become right by L (x, y, theta), `turn` off the heading.
+struct WrongPoses {
+  const char *name, *alias, *other, *thing, *remedy;
+  double x, y, theta;
+  double turn = 0;
+  bool swaps = false;     // x and y
+  bool of_world = false;  // of increments the same as others of a sensor that looks another way
+};
+constexpr WrongPoses kWrongPoses[] = {
+    {"heading_flipped", "heading_sign", "", "the sign of the headings", "Turn the sign of theta.",
+     1, 1, -1},
+    {"heading_flipped", "heading_offset", "", "headings that count clockwise from north (y)",
+     "Take theta from pi / 2.", 1, 1, -1, -pi / 2, false, true},
+    {"axes_mirrored", "axes_swapped", "", "a world frame that is left-handed",
+     "Turn the sign of y, and that of theta when it follows the robot's turns the wrong way.", 1,
+     -1, 1},
+    {"axes_swapped", "axes_mirrored", "", "x and y of the poses", "Swap the columns x and y.", 1, 1,
+     1, 0, true, true},
+    {"heading_unit", "unit_error", "", "headings in degrees", "Multiply theta by pi / 180.", 1, 1,
+     pi / 180},
+    // asin() of a quaternion's z.
+    {"heading_unit", "unit_error", "", "headings that are half of what they should be",
+     "Double theta.", 1, 1, 2},
+    {"heading_turned", "marker_yaw", "heading_offset",
+     "headings that count from another axis, 90 degrees on", "State the marker's yaw.", 1, 1, 1,
+     pi / 2, false, true},
+    {"heading_turned", "marker_yaw", "heading_offset",
+     "headings that count from another axis, -90 degrees on", "State the marker's yaw.", 1, 1, 1,
+     -pi / 2, false, true},
+    {"heading_turned", "marker_yaw", "heading_offset",
+     "headings that count from another axis, 180 degrees on", "State the marker's yaw.", 1, 1, 1,
+     pi, false, true}};
+
+constexpr std::pair<const char*, double> kLengths[] = {{"millimetres", 0.001},
+                                                       {"centimetres", 0.01},
+                                                       {"decimetres", 0.1},
+                                                       {"inches", 0.0254},
+                                                       {"feet", 0.3048}};
+
+}  // namespace
+
 void Catalogue::wrong_poses() {
-  const auto diagonal = [](double x, double y, double theta) -> Eigen::Matrix3d {
-    return Eigen::Vector3d(x, y, theta).asDiagonal();
-  };
-  fault("heading_flipped", {"heading_sign"}, "the sign of the headings", "Turn the sign of theta.",
-        change_poses(diagonal(1, 1, -1)));
-  fault("heading_flipped", {"heading_offset"}, "headings that count clockwise from north (y)",
-        "Take theta from pi / 2.", change_poses(diagonal(1, 1, -1), -pi / 2))
-      .of_world = true;
-  fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
-        "Turn the sign of y, and that of theta when it follows the robot's turns the wrong way.",
-        change_poses(diagonal(1, -1, 1)));
-  Eigen::Matrix3d swapped = diagonal(0, 0, 1);
-  swapped(0, 1) = swapped(1, 0) = 1;
-  // Of increments the same as mirrored ones of a sensor that looks another way.
-  fault("axes_swapped", {"axes_mirrored"}, "x and y of the poses", "Swap the columns x and y.",
-        change_poses(swapped))
-      .of_world = true;
-  fault("heading_unit", {"unit_error"}, "headings in degrees", "Multiply theta by pi / 180.",
-        change_poses(diagonal(1, 1, pi / 180)))
-      .radians = pi / 180;
-  // asin() of a quaternion's z.
-  fault("heading_unit", {"unit_error"}, "headings that are half of what they should be",
-        "Double theta.", change_poses(diagonal(1, 1, 2)))
-      .radians = 2;
-  for (const double turn : {pi / 2, -pi / 2, pi}) {
-    fault("heading_turned", {"marker_yaw", "heading_offset"},
-          "headings that count from another axis, " + std::to_string(std::lround(turn * 180 / pi)) +
-              " degrees on",
-          "State the marker's yaw.", change_poses(diagonal(1, 1, 1), turn))
-        .of_world = true;
+  for (const WrongPoses& w : kWrongPoses) {
+    Eigen::Matrix3d L = Eigen::Vector3d(w.x, w.y, w.theta).asDiagonal();
+    if (w.swaps) L.row(0).swap(L.row(1));
+    std::vector<std::string> aliases = {w.alias, w.other};
+    std::erase(aliases, "");
+    GroundHypothesis& h =
+        fault(w.name, std::move(aliases), w.thing, w.remedy, change_poses(L, w.turn));
+    h.of_world = w.of_world;
+    h.radians = std::abs(w.theta);
   }
-  for (const auto& [unit, metres] : {std::pair{"millimetres", 0.001},
-                                     {"centimetres", 0.01},
-                                     {"decimetres", 0.1},
-                                     {"inches", 0.0254},
-                                     {"feet", 0.3048}}) {
+  for (const auto& [unit, metres] : kLengths) {
     fault("unit_error", {"pose_units", "pose_scale"}, std::string("positions in ") + unit,
           "Multiply x and y by " + std::to_string(metres) + ".",
-          change_poses(diagonal(metres, metres, 1)))
+          change_poses(Eigen::Vector3d(metres, metres, 1).asDiagonal()))
         .metres = metres;
   }
+}
+
+// What is wrong with commands, as poses show it.
+void Catalogue::wrong_sides_of_poses() {
+  fault("sides_swapped", {"command_sign"}, "the side to which it turns",
+        "Exchange left and right in the commands, or mirror the poses.",
+        change_poses(Eigen::Vector3d(1, -1, -1).asDiagonal()));
+  fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
+        "Turn the sign of x.", change_poses(Eigen::Vector3d(-1, 1, 1).asDiagonal()));
 }
 
 void Catalogue::wrong_increments() {

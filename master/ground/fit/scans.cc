@@ -51,11 +51,11 @@ Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>&
 }
 
 Eigen::VectorXd scan_size(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                          const Eigen::VectorXd& values, Eigen::Index row) {
-  const KinematicRow& of = rows[static_cast<std::size_t>(row)].row;
+                          const Eigen::VectorXd& values) {
+  const KinematicRow& of = rows.back().row;
   std::vector<Eigen::VectorXd> others;
   for (double size = plausible_error(of); size > of.tolerance; size /= 2) {
-    others.emplace_back(values)[row] = of.nominal + size;
+    others.emplace_back(values)[values.size() - 1] = of.nominal + size;
   }
   return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
 }

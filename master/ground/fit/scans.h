@@ -24,8 +24,8 @@ Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>
 Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                           const Eigen::VectorXd& values);
 
-// Values of which one row is the best of what is plausible of it, its half, a quarter, ...
+// Values of which the last row is the best of what is plausible of it, its half, a quarter, ...
 Eigen::VectorXd scan_size(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                          const Eigen::VectorXd& values, Eigen::Index row);
+                          const Eigen::VectorXd& values);
 
 }  // namespace gapfarm

@@ -1,5 +1,3 @@
-#include "master/ground/floor/regions.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "common/base/constants.h"
+#include "master/ground/catalogue.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/tolerances.h"
 

@@ -1,5 +1,3 @@
-#include "master/ground/floor/tilt.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 
 #include "common/base/constants.h"
 #include "common/pose/pose.h"
+#include "master/ground/catalogue.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/tolerances.h"
 
