@@ -59,23 +59,19 @@ WindowError error_of(const Pose& end, const Trial& trial) {
   return {d.head<2>().norm(), std::abs(d[2])};
 }
 
-// 0 where no window went anywhere.
-double median_a_metre(const std::vector<double>& errors) {
-  return errors.empty() ? 0 : median(errors);
-}
-
 WindowErrors medians_of(std::span<const WindowRow> windows, WindowError WindowRow::*which,
                         double travel_m) {
-  std::vector<double> position, heading, position_m, heading_m;
-  for (const WindowRow& row : windows) {
-    const WindowError& error = row.*which;
-    position.push_back(error.position_m);
-    heading.push_back(error.heading_rad);
-    if (!(row.travel_m > kLeastPathShare * travel_m)) continue;
-    position_m.push_back(error.position_m / row.travel_m);
-    heading_m.push_back(error.heading_rad / row.travel_m);
-  }
-  return {median(position), median(heading), median_a_metre(position_m), median_a_metre(heading_m)};
+  // 0 where no window went anywhere.
+  const auto middle = [&](double WindowError::*of, bool a_metre) {
+    std::vector<double> errors;
+    for (const WindowRow& row : windows) {
+      if (a_metre && !(row.travel_m > kLeastPathShare * travel_m)) continue;
+      errors.push_back(row.*which.*of / (a_metre ? row.travel_m : 1));
+    }
+    return errors.empty() ? 0 : median(errors);
+  };
+  return {middle(&WindowError::position_m, false), middle(&WindowError::heading_rad, false),
+          middle(&WindowError::position_m, true), middle(&WindowError::heading_rad, true)};
 }
 
 std::vector<double> each(std::span<const WindowRow> windows, WindowError WindowRow::*which,

@@ -11,7 +11,7 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/fit_file.h"
-#include "master/ground/fit/window_prior.h"
+#include "master/ground/fit/window_fit.h"
 #include "master/ground/program_runs.h"
 #include "master/report/report_html.h"
 

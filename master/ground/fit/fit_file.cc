@@ -3,17 +3,16 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/json/fields.h"
+
 namespace gapfarm {
 namespace {
 
-// None where the line has no list of numbers there.
+// None where the line has no list there.
 std::optional<std::vector<double>> numbers(const Json& line, const char* key) {
-  if (!line.is_object() || !line.contains(key) || !line[key].is_array()) return {};
+  if (!line.is_object() || !line.contains(key)) return {};
   std::vector<double> all;
-  for (const Json& number : line[key]) {
-    if (!number.is_number()) return {};
-    all.push_back(number.get<double>());
-  }
+  LenientFields(line).field(key, all);
   return all;
 }
 

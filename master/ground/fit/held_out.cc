@@ -66,6 +66,11 @@ Interval ninety_percent_of(std::vector<double> drawn) {
   return {drawn[tail], drawn[drawn.size() - 1 - tail]};
 }
 
+Interval interval_about(double value, std::vector<double> drawn) {
+  const auto [lo, hi] = ninety_percent_of(std::move(drawn));
+  return {std::min(lo, value), std::max(hi, value)};
+}
+
 std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
                                          const std::vector<FitRow>& rows,
                                          const Eigen::VectorXd& start) {
@@ -78,32 +83,36 @@ std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
   return parts;
 }
 
-WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                       const Eigen::VectorXd& start) {
-  const std::vector<int> folds = held_out_folds(fitter.windows());
-  const std::vector<WindowFit> parts = fit_without_folds(fitter, rows, start);
-  WindowFit whole = fitter.hold(rows, start);
+namespace {
+
+// With every window of the part that was made without its fold.
+WindowFit assembled(const WindowSet& windows, WindowFit whole,
+                    const std::vector<WindowFit>& parts) {
+  const std::vector<int> folds = held_out_folds(windows);
   for (std::size_t i = 0; i < whole.nats.size(); ++i) {
-    const auto block = static_cast<std::size_t>(fitter.windows().block[i]);
-    const WindowFit& part = parts[folds[block]];
+    const WindowFit& part = parts[folds[windows.block[i]]];
     whole.nats[i] = part.nats[i];
     whole.residuals[i] = part.residuals[i];
   }
   return whole;
 }
 
+}  // namespace
+
+WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                       const Eigen::VectorXd& start) {
+  return assembled(fitter.windows(), fitter.hold(rows, start),
+                   fit_without_folds(fitter, rows, start));
+}
+
 WindowFit judge_held_out(const WindowFitter& fitter, WindowFit fit,
                          const std::vector<Eigen::Vector3d>& raw) {
   const std::vector<int> folds = held_out_folds(fitter.windows());
-  WindowFit judged = fitter.judge(fit, raw);
+  std::vector<WindowFit> parts;
   for (int fold = 0; fold < kFolds; ++fold) {
-    const std::vector<char> out = out_with(fold, folds);
-    const WindowFit part = fitter.judge(fit, raw, out);
-    for (std::size_t i = 0; i < part.nats.size(); ++i) {
-      if (out[fitter.windows().block[i]]) judged.nats[i] = part.nats[i];
-    }
+    parts.push_back(fitter.judge(fit, raw, out_with(fold, folds)));
   }
-  return judged;
+  return assembled(fitter.windows(), fitter.judge(std::move(fit), raw), parts);
 }
 
 std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint64_t seed,

@@ -38,6 +38,9 @@ std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint
 
 // What nine in ten of some draws lie within.
 Interval ninety_percent_of(std::vector<double> drawn);
+// With the fit's own value: where the draws lead away from it, it has not settled, and is no surer
+// than that.
+Interval interval_about(double value, std::vector<double> drawn);
 
 // What follows from a fit's values, with 90 % of the draws, no less wide than by what fits without
 // one of the folds each scatter by (the jackknife): slopes where few windows lie, and forms that

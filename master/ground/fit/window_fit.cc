@@ -9,7 +9,6 @@
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/score/kinematic.h"
-#include "master/ground/fit/window_prior.h"
 
 namespace gapfarm {
 namespace {

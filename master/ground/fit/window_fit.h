@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/hash.h"
 #include "common/robot/robot.h"
 #include "common/score/kinematic_paths.h"
 #include "master/ground/fit/window_set.h"
@@ -91,6 +92,31 @@ struct OffsetFit {
 
 inline const std::optional<GroundReference> kNoReference;
 
+inline constexpr double kWindowTail = 4;  // degrees of freedom of a residual's density
+
+// Of a residual in a step of least squares, its scale being s.
+inline double window_weight(double r, double s) {
+  const double z = r / s;
+  return (kWindowTail + 1) / (kWindowTail + z * z) / (s * s);
+}
+
+// Log density of a residual: Student's.
+double window_nats(double residual, double scale);
+
+// Times and values, into a hash.
+inline void add_rows(const std::vector<CommandRow>& rows, Hasher* hasher) {
+  for (const CommandRow& row : rows) {
+    hasher->add(row.t_s);
+    for (const double value : row.values) hasher->add(value);
+  }
+}
+
+// Hash of all that fits to these windows depend on beside rows and start.
+std::string question_of(const GroundRobot& robot, const WindowSet& windows,
+                        const std::optional<GroundReference>& reference);
+
+// Not infer::Fitter, which has one scale of the noise: here each length and component has its own,
+// and the values' priors go together where a reference is known.
 class WindowFitter {
  public:
   // All outlive the fitter.  With a reference its values are in place of the robot's, and rows are

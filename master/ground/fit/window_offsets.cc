@@ -7,7 +7,6 @@
 
 #include "common/math/algebra.h"
 #include "master/ground/fit/window_fit.h"
-#include "master/ground/fit/window_prior.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

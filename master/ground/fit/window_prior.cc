@@ -1,5 +1,3 @@
-#include "master/ground/fit/window_prior.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include "common/random/stream.h"
 #include "common/robot/robot_file.h"
 #include "master/ground/fit/held_out.h"
+#include "master/ground/fit/window_fit.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -179,10 +178,8 @@ Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t see
     for (Eigen::Index d = 0; d < drawn.cols(); ++d) {
       row[d] = drawn(k, d) - (a >= 0 ? reference_->draws(a, d) : 0);
     }
-    const auto [lo, hi] = ninety_percent_of(std::move(row));
-    // Where the draws lead away from the fit, it has not settled: it is no surer than that.
-    bounds(k, 0) = std::min(lo, fit.values[k]);
-    bounds(k, 1) = std::max(hi, fit.values[k]);
+    const auto [lo, hi] = interval_about(fit.values[k], std::move(row));
+    bounds.row(k) << lo, hi;
   }
   return bounds;
 }

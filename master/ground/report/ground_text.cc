@@ -11,7 +11,6 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/laws.h"
-#include "master/ground/fit/window_prior.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

@@ -14,6 +14,7 @@
 #include "common/random/stream.h"
 #include "common/score/kinematic.h"
 #include "master/diagnose/result/diagnosis.h"
+#include "master/ground/fit/held_out.h"
 #include "master/ground/report/simulator_model.h"
 
 namespace gapfarm {
@@ -22,7 +23,6 @@ namespace {
 constexpr double kBeginAt = 10;      // times the values' covariance, where they may vary
 constexpr double kFarthest = 4;      // standard deviations that no draw lies beyond
 constexpr int kMostAttempts = 1000;  // at a draw within the bounds; then it is moved onto them
-constexpr double kLow = 0.05, kHigh = 0.95;
 
 // Sizes in m in place of ratios to them, of a robot with two sides.
 void put_size(const GroundRobot& robot, ValueRange* range) {
@@ -91,9 +91,7 @@ bool is_table(const Json& value) {
 Interval interval_of(const GroundReference& fit, Eigen::Index k) {
   std::vector<double> drawn;
   for (const double off : fit.draws.row(k)) drawn.push_back(fit.values[k] + off);
-  // Where the draws lead away from the fit, it has not settled.
-  return {std::min(quantile(drawn, kLow), fit.values[k]),
-          std::max(quantile(drawn, kHigh), fit.values[k])};
+  return interval_about(fit.values[k], std::move(drawn));
 }
 
 Ranges ranges_of(const GroundRobot& robot, const GroundReference& fit) {
