@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "master/infer/climb.h"
-#include "master/infer/scope.h"
 
 namespace gapfarm::infer {
 namespace {
@@ -22,19 +21,31 @@ Eigen::VectorXd joined(const Eigen::VectorXd& base, const Eigen::VectorXd& own) 
   return u;
 }
 
-// Every so manieth of them.
-std::vector<std::uint32_t> every(std::uint32_t step, std::size_t count) {
-  std::vector<std::uint32_t> index;
-  for (std::uint32_t i = 0; i < count; i += step) index.push_back(i);
-  return index;
+// The same with every second one alone.
+Observations half_of(Observations some) {
+  some.weight.resize(some.size(), 1);
+  for (std::uint32_t i = 0; i < some.size(); ++i) {
+    if (i % 2 == 0) some.asked.push_back(i);
+    if (i % 2 != 0) some.weight[i] = 0;
+  }
+  return some;
+}
+
+// Those that are asked for.
+std::vector<std::uint32_t> asked_of(const Observations& all, std::vector<std::uint32_t> some) {
+  std::erase_if(some, [&](std::uint32_t i) {
+    return !all.asked.empty() && !std::ranges::binary_search(all.asked, i);
+  });
+  return some;
 }
 
 using Anchor = Fit;  // of the base, with its slopes: runners start there
 
 class Search {
  public:
-  Search(const Scope& scope, const Space& base, const std::vector<Hypothesis>& hypotheses)
-      : scope_(scope), base_(base), hypotheses_(hypotheses) {}
+  Search(const Forward& forward, const Observations& observations, const Space& base,
+         const std::vector<Hypothesis>& hypotheses)
+      : forward_(forward), observations_(observations), base_(base), hypotheses_(hypotheses) {}
 
   Result<std::vector<Anchor>> anchors(const Eigen::VectorXd& base,
                                       const std::vector<Overrides>& others) const;
@@ -46,14 +57,13 @@ class Search {
   Status search_blindly(double score, std::vector<Runner>* runners) const;
 
  private:
-  Fitter fitter(const Space& space) const {
-    return Fitter(scope_.forward, scope_.observations, space);
-  }
+  Fitter fitter(const Space& space) const { return Fitter(forward_, observations_, space); }
   Result<std::vector<Runner>> at_starts(std::size_t hypothesis, const Anchor& anchor) const;
   Result<Fit> from_neutral(const Hypothesis& h, const Fitter& fitter, const Anchor& anchor) const;
   Status search_blindly(Runner* runner) const;
 
-  const Scope& scope_;
+  const Forward& forward_;
+  const Observations& observations_;
   const Space& base_;
   const std::vector<Hypothesis>& hypotheses_;
 };
@@ -81,15 +91,13 @@ Result<std::vector<Runner>> Search::at_starts(std::size_t hypothesis, const Anch
   std::vector<Eigen::VectorXd> points;
   std::vector<Space> spaces;
   for (const Start& start : h.starts) {
-    std::vector<std::uint32_t> some = within(scope_, start.reach);
+    std::vector<std::uint32_t> some = asked_of(observations_, start.reach);
     if (some.empty() && !start.reach.empty()) continue;
     points.push_back(joined(anchor.u, own.from(start.at)));
     spaces.push_back(space.holding(start.at));
     reach.push_back(std::move(some));
   }
-  ASSIGN_OR_RETURN(
-      auto fits,
-      Fitter(scope_.forward, scope_.observations, space).starts(points, spaces, reach, anchor.z));
+  ASSIGN_OR_RETURN(auto fits, fitter(space).starts(points, spaces, reach, anchor.z));
   std::vector<Runner> runners;
   for (std::size_t k = 0; k < fits.size(); ++k) {
     if (std::isfinite(fits[k].score))
@@ -178,7 +186,7 @@ Status Search::search_blindly(Runner* runner) const {
   const auto score = [&](const std::vector<double>& x) {
     const Eigen::VectorXd u =
         joined(base, Eigen::VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size())));
-    const auto touched = within(scope_, h.touched(runner->space.values(u)));
+    const auto touched = asked_of(observations_, h.touched(runner->space.values(u)));
     if (touched.empty() || !predicted) return without.score;
     const auto fit = fits.starts({u}, {runner->space}, {touched}, without.z);
     if (!fit) predicted = fit.error();
@@ -280,9 +288,9 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
     if (on_standings) on_standings(standings);
   };
   const bool half = terms.effort == Effort::kGlobal && observations.size() >= kManyObservations;
-  const Scope some = scope_of(forward, observations, every(half ? 2 : 1, observations.size()));
-  const Scope all = scope_of(forward, observations, every(1, observations.size()));
-  const Search first(some, base.space, hypotheses), whole(all, base.space, hypotheses);
+  const Observations some = half ? half_of(observations) : observations;
+  const Search first(forward, some, base.space, hypotheses);
+  const Search whole(forward, observations, base.space, hypotheses);
   ASSIGN_OR_RETURN(const auto anchors, first.anchors(base.fit.u, terms.bases));
   auto runners = first.line_up(anchors, terms);
   if (!runners) return runners.error();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -94,9 +96,10 @@ Eigen::Vector3d Fitter::residual(std::size_t i, const Pose& end) const {
 }
 
 Eigen::VectorXd Fitter::whitened(const std::vector<Pose>& ends) const {
-  Eigen::VectorXd z(static_cast<Eigen::Index>(3 * ends.size()));
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    z.segment<3>(static_cast<Eigen::Index>(3 * i)) = residual(i, ends[i]);
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * observations_.size()));
+  for (std::size_t j = 0; j < ends.size(); ++j) {
+    const std::size_t i = observations_.asked.empty() ? j : observations_.asked[j];
+    z.segment<3>(static_cast<Eigen::Index>(3 * i)) = residual(i, ends[j]);
   }
   return z;
 }
@@ -131,9 +134,10 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
                                         const std::vector<std::vector<std::uint32_t>>& reach,
                                         const Eigen::VectorXd& elsewhere) const {
   std::vector<PredictionRequest> requests;
+  const auto reaches_all = [&](std::size_t k) { return reach.empty() || reach[k].empty(); };
   for (std::size_t k = 0; k < points.size(); ++k) {
     requests.push_back(
-        {spaces[k].values(points[k]), reach.empty() ? std::vector<std::uint32_t>() : reach[k]});
+        {spaces[k].values(points[k]), reaches_all(k) ? observations_.asked : reach[k]});
   }
   ASSIGN_OR_RETURN(const auto ends, forward_(requests));
   std::vector<Fit> fits(points.size());
@@ -142,8 +146,8 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
     if (!ends[k]) continue;
     const std::vector<std::uint32_t>& some = requests[k].trials;
     const Eigen::VectorXd linear = beside(points[k]);
-    Eigen::VectorXd z = some.empty() ? whitened(*ends[k]) + linear : elsewhere;
-    for (std::size_t j = 0; j < some.size(); ++j) {
+    Eigen::VectorXd z = reaches_all(k) ? whitened(*ends[k]) + linear : elsewhere;
+    for (std::size_t j = 0; j < some.size() && !reaches_all(k); ++j) {
       const auto at = static_cast<Eigen::Index>(3 * some[j]);
       z.segment<3>(at) = residual(some[j], (*ends[k])[j]) + linear.segment<3>(at);
     }
@@ -177,7 +181,7 @@ Status Fitter::move_each(const Forward& forward, const Eigen::VectorXd& from, do
     Eigen::VectorXd u = fit->u;
     u[k] += share * fit->differences[k];
     if (u[k] < space_.lower()[k] || u[k] > space_.upper()[k]) continue;
-    requests.push_back({space_.values(u), {}});
+    requests.push_back({space_.values(u), observations_.asked});
     dimension.push_back(k);
   }
   if (requests.empty()) return {};
@@ -187,7 +191,8 @@ Status Fitter::move_each(const Forward& forward, const Eigen::VectorXd& from, do
     const Eigen::Index k = dimension[j];
     const double step = share * fit->differences[k];
     Eigen::VectorXd change = whitened(*ends[j]) - from;
-    const double moved = std::sqrt(change.squaredNorm() / static_cast<double>(change.size()));
+    const double moved =
+        std::sqrt(change.squaredNorm() / (3 * static_cast<double>(ends[j]->size())));
     bound_jumps(kFar * std::max(moved, fit->scale), &change);
     fit->slopes.col(k) = change / step;
     const double good = kGoodMove * fit->scale / std::max(moved / std::abs(step), 1e-9);
@@ -217,7 +222,7 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
   const Forward* forward = &forward_;
   Eigen::VectorXd from = fit->z - beside(fit->u);
   if (coarse_ != nullptr && !open.empty()) {
-    ASSIGN_OR_RETURN(const auto there, (*coarse_)({{space_.values(fit->u), {}}}));
+    ASSIGN_OR_RETURN(const auto there, (*coarse_)({{space_.values(fit->u), observations_.asked}}));
     if (there.front()) {
       forward = coarse_;
       from = whitened(*there.front());
@@ -337,6 +342,25 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
     }
   }
   return scores;
+}
+
+Forward remembering(Forward forward) {
+  using Point = std::pair<Overrides, std::vector<std::uint32_t>>;
+  using Ends = std::optional<std::vector<Pose>>;
+  return [forward = std::move(forward), known = std::make_shared<std::map<Point, Ends>>()](
+             const std::vector<PredictionRequest>& points) -> Result<std::vector<Ends>> {
+    std::vector<PredictionRequest> unknown;
+    for (const PredictionRequest& p : points) {
+      if (known->count({p.at, p.trials}) == 0) unknown.push_back(p);
+    }
+    if (!unknown.empty()) {
+      ASSIGN_OR_RETURN(auto ends, forward(unknown));
+      for (std::size_t k = 0; k < unknown.size(); ++k) {
+        (*known)[{unknown[k].at, unknown[k].trials}] = std::move(ends[k]);
+      }
+    }
+    return mapped(points, [&](const PredictionRequest& p) { return known->at({p.at, p.trials}); });
+  };
 }
 
 }  // namespace gapfarm::infer

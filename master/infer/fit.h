@@ -37,6 +37,8 @@ struct Observations {
   Loss loss = Loss::kStudent;
   // How often each counts; 0: nothing is learnt from it.  Empty: once.
   std::vector<double> weight = {};
+  // Those that are simulated (ascending); the others have no weight.  Empty: all.
+  std::vector<std::uint32_t> asked = {};
 
   std::size_t size() const { return measured.size(); }
 };
@@ -45,6 +47,10 @@ struct Observations {
 // simulated.  Errors: the simulation's own, never a point's.
 using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>>>>(
     const std::vector<PredictionRequest>& points)>;
+
+// The same, asking once for what was asked before: a fit of what no simulation moves stays where it
+// is.
+Forward remembering(Forward forward);
 
 struct Fit {
   Eigen::VectorXd u;            // in the space's coordinates
@@ -107,6 +113,7 @@ class Fitter {
   // The best step from `u` within the bounds, no coordinate farther than kLongestStep.
   Eigen::VectorXd bounded_step(const Eigen::VectorXd& u, const Normal& equations) const;
   Eigen::Vector3d residual(std::size_t observation, const Pose& end) const;
+  // 0 of what is not asked for.
   Eigen::VectorXd whitened(const std::vector<Pose>& ends) const;
   // What the coordinates without a parameter add there.
   Eigen::VectorXd beside(const Eigen::VectorXd& u) const;

@@ -12,7 +12,7 @@
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
 #include "master/infer/certificate.h"
-#include "master/infer/scope.h"
+#include "master/infer/fit.h"
 
 namespace gapfarm {
 namespace {

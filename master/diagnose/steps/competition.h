@@ -7,7 +7,6 @@
 
 #include "master/diagnose/steps/step_parts.h"
 #include "master/infer/compete.h"
-#include "master/infer/scope.h"
 
 namespace gapfarm::steps {
 

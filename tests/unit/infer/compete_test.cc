@@ -9,7 +9,6 @@
 #include "common/parameters/push.h"
 #include "common/random/stream.h"
 #include "master/infer/certificate.h"
-#include "master/infer/scope.h"
 
 namespace gapfarm::infer {
 namespace {
@@ -177,18 +176,19 @@ TEST(InferFit, AColumnTakesItsPartWithoutASimulation) {
   EXPECT_EQ(asked, 1u);
 }
 
-TEST(InferScope, AsksForItsOwnAlone) {
-  const Forward f = forward();
-  const Observations o = observed({{row("finger_friction"), 0.4}});
-  const Scope some = scope_of(f, o, {3, 8, 50});
-  const Overrides at = {{row("finger_friction"), 0.7}};
-  const auto ends = some.forward({{at, {}}, {at, {2}}}).value();
-  ASSERT_EQ(ends[0]->size(), 3u);
-  EXPECT_EQ((*ends[0])[1].x, end_of(8, at).x);
-  ASSERT_EQ(ends[1]->size(), 1u);
-  EXPECT_EQ((*ends[1])[0].x, end_of(50, at).x);
-  EXPECT_EQ(some.observations.measured[2].y, o.measured[50].y);
-  EXPECT_EQ(within(some, {1, 8, 49, 50}), (std::vector<std::uint32_t>{1, 2}));
+// Half of the observations show the value as well, and no others are simulated.
+TEST(InferFit, AsksForSomeAlone) {
+  Observations o = observed({{row("finger_friction"), 0.6}});
+  for (std::uint32_t i = 0; i < kObservations; ++i) {
+    o.weight.push_back(i % 2);
+    if (i % 2 == 1) o.asked.push_back(i);
+  }
+  const Forward f = [&](const std::vector<PredictionRequest>& points) {
+    for (const PredictionRequest& p : points) EXPECT_EQ(p.trials, o.asked);
+    return forward()(points);
+  };
+  const Model base = base_of(f, o);
+  EXPECT_NEAR(base.space.values(base.fit.u).at(row("finger_friction")), 0.6, 0.02);
 }
 
 TEST(InferFit, FindsTheValueDespiteOutliers) {
