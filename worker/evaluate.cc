@@ -9,7 +9,6 @@
 #include "common/base/hash.h"
 #include "common/score/motion_model.h"
 #include "worker/fitness.h"
-#include "worker/scenarios/outcome.h"
 #include "worker/scenarios/scenario.h"
 
 namespace gapfarm {

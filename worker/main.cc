@@ -16,7 +16,6 @@
 #include "common/usage/usage.h"
 #include "worker/evaluate.h"
 #include "worker/service.h"
-#include "worker/supervisor.h"
 
 namespace gapfarm {
 namespace {

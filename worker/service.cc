@@ -16,7 +16,6 @@
 #include "common/net/master_wait.h"
 #include "common/net/socket.h"
 #include "worker/evaluate.h"
-#include "worker/pump.h"
 
 namespace gapfarm {
 namespace {

@@ -4,8 +4,7 @@
 #include <utility>
 
 #include "common/base/hash.h"
-#include "common/net/envelope.h"
-#include "common/problem/question.h"
+#include "common/problem/problem.h"
 
 namespace gapfarm {
 namespace {
@@ -345,6 +344,25 @@ v1::Envelope WorkerSession::goodbye(const std::string& reason) const {
   v1::Envelope envelope;
   envelope.mutable_goodbye()->set_reason(reason);
   return envelope;
+}
+
+bool pump_in(Transport& transport, WorkerSession& session, double now) {
+  Message message;
+  v1::Envelope envelope;
+  bool any = false;
+  while (transport.receive(&message)) {
+    any = true;
+    const DecodeStatus status = decode(message.bytes, &envelope);
+    if (status == DecodeStatus::kOk) session.on_message(&envelope, now);
+    if (status == DecodeStatus::kOtherProtocol) session.on_other_protocol(envelope.protocol());
+  }
+  return any;
+}
+
+void pump_out(Transport& transport, WorkerSession& session) {
+  for (v1::Envelope& envelope : session.take_outbox()) {
+    if (transport.send("", encode(&envelope)) != SendStatus::kSent) session.on_unsent(&envelope);
+  }
 }
 
 }  // namespace gapfarm

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/net/envelope.h"
 #include "gapfarm/v1/farm.pb.h"
 
 namespace gapfarm {
@@ -159,5 +160,12 @@ class WorkerSession {
   std::uint64_t hellos_ = 0;
   std::vector<v1::Envelope> outbox_;
 };
+
+// Moves messages between a transport and the worker's session.
+
+// Handles what has arrived.  True: something had.
+bool pump_in(Transport& transport, WorkerSession& session, double now);
+// Sends what is to be sent.
+void pump_out(Transport& transport, WorkerSession& session);
 
 }  // namespace gapfarm

@@ -1,5 +1,3 @@
-#include "worker/supervisor.h"
-
 #include <poll.h>
 #include <signal.h>
 #include <unistd.h>
@@ -10,6 +8,7 @@
 
 #include "common/base/clock.h"
 #include "gapfarm/v1/farm.pb.h"
+#include "worker/service.h"
 
 namespace gapfarm {
 namespace {

@@ -1,4 +1,5 @@
-// Short words for what algorithms do to whole ranges.  A projection is a member or a function.
+// Intervals, and short words for what algorithms do to whole ranges.  A projection is a member or a
+// function.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +10,13 @@
 #include <vector>
 
 namespace gapfarm {
+
+// An interval of numbers, in the unit of whatever it is one of.
+struct Interval {
+  double lower = 0;
+  double upper = 0;
+  bool operator==(const Interval&) const = default;
+};
 
 // What `of` makes of every item, in their order.
 template <class Range, class Of>

@@ -1,8 +1,11 @@
 // Texts out of numbers and of other texts.
 #pragma once
 
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -55,5 +58,37 @@ std::string nearest_word(std::string_view word, std::span<const std::string> kno
 
 // "; did you mean 'forward'?" or, when nothing is near, "; known: a, b, c".
 std::string suggestion(std::string_view word, std::span<const std::string> known);
+
+// Numbers as people read them.
+
+// The number that `value` is when it is written with so many significant digits: small values do
+// not vanish, and its shortest text is no longer.  0 digits: as it is.
+inline double rounded_to_digits(double value, int digits) {
+  if (digits <= 0 || !std::isfinite(value)) return value;
+  char text[64];
+  const auto end =
+      std::to_chars(text, text + sizeof text, value, std::chars_format::scientific, digits - 1);
+  std::from_chars(text, end.ptr, value);
+  return value;
+}
+
+// Times, shares and numbers in words.
+
+// "1 h 02 min", "3 min 20 s", "12 s", "0.4 s"; "?" for what is no time.
+std::string format_duration(double seconds);
+
+// In UTC, as strftime() writes it, up to 39 characters.
+std::string utc_text(double unix_s, const char* format);
+
+// "0 %", "0.4 %", "37 %"; "100 %" only for all of it.
+std::string format_share(double share);
+
+// Six significant digits, "-" for none.
+std::string format_number(const std::optional<double>& value, int digits = 6);
+// ", 210/s"; "" while there is none.
+std::string rate_text(double rate_per_s);
+// "generation 41 of 100, 210/s, about 12 s left": the text of a progress line.
+std::string progress_text(std::string_view what, double rate_per_s,
+                          std::optional<double> time_left_s);
 
 }  // namespace gapfarm

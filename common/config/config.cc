@@ -1,10 +1,13 @@
 #include "common/config/config.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <sstream>
 
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
 #include "common/config/sections.h"
+#include "common/config/toml_section.h"
 #include "common/external/simulator.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
@@ -193,6 +196,166 @@ Status check_evolvable(const Config& config) {
                  "  friction = [0.1, 1.5]"};
   }
   return {};
+}
+
+namespace {
+
+// Puts `changes` into `base`; sections are merged, everything else is replaced.
+void merge(toml::table& base, const toml::table& changes) {
+  for (const auto& [key, node] : changes) {
+    toml::table* below = base.contains(key) ? base.get(key)->as_table() : nullptr;
+    if (below != nullptr && node.is_table()) {
+      merge(*below, *node.as_table());
+    } else {
+      base.insert_or_assign(key, node);
+    }
+  }
+}
+
+// toml++ sorts keys; the author's order means something.
+std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table) {
+  std::vector<std::pair<std::string, const toml::node*>> nodes;
+  for (const auto& [key, node] : table) nodes.emplace_back(key.str(), &node);
+  std::stable_sort(nodes.begin(), nodes.end(), [](const auto& a, const auto& b) {
+    return a.second->source().begin < b.second->source().begin;
+  });
+  return nodes;
+}
+
+Result<Variant> read_variant(const std::string& name, const toml::table& changes, toml::table base,
+                             const std::string& base_path, const std::string& path) {
+  merge(base, changes);
+  std::ostringstream text;
+  text << base;
+  Result<Config> config = parse_config(text.str(), base_path, start_program);
+  // Places would be those of the merged text, which nobody has seen.
+  if (!config) {
+    return Error{path + ": variant \"" + name +
+                 "\", merged with its config: " + config.error().message};
+  }
+  return Variant{name, *std::move(config)};
+}
+
+}  // namespace
+
+bool is_comparison(std::string_view text) {
+  const auto parsed = parse_toml(text, "");
+  return parsed.ok() && parsed->contains("compare");
+}
+
+Result<Comparison> read_comparison(const std::string& path) {
+  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
+  ASSIGN_OR_RETURN(const auto parsed, parse_toml(text, path));
+  TomlErrors errors(path);
+  TomlSection top(parsed, "", errors);
+  Comparison comparison;
+  std::string config;
+  if (auto section = top.section("compare")) {
+    section->read("config", config);
+    section->read("seeds", comparison.seeds, 1, 10000);
+    section->read("evaluations", comparison.evaluations, 1);
+    section->read("target_fitness", comparison.target_fitness, -kUnbounded, kUnbounded);
+    section->finish();
+  }
+  const auto variants = top.section("variants");
+  top.finish();
+  if (!errors.empty()) return errors.error();
+  if (config.empty()) return Error{path + ": [compare] names no config; add config = \"FILE\""};
+  if (!variants || variants->table().empty()) {
+    return Error{path + ": there are no variants; add sections such as [variants.small]"};
+  }
+  const std::string base_path =
+      (std::filesystem::path(path).parent_path() / config).lexically_normal().string();
+  ASSIGN_OR_RETURN(const auto base_text, read_text_file(base_path));
+  ASSIGN_OR_RETURN(const auto base, parse_toml(base_text, base_path));
+  for (const auto& [name, section] : in_file_order(variants->table())) {
+    if (!section->is_table()) return Error{path + ": variant \"" + name + "\" is no section"};
+    ASSIGN_OR_RETURN(auto variant, read_variant(name, *section->as_table(), base, base_path, path));
+    comparison.variants.push_back(std::move(variant));
+  }
+  return comparison;
+}
+
+namespace {
+
+class StageReader {
+ public:
+  StageReader(const Config& config, TomlErrors& errors) : config_(config), errors_(errors) {
+    for (const Gene& gene : config.problem.genes) {
+      names_.push_back(config.problem.table()[gene.row].key);
+    }
+  }
+
+  void read(const toml::node& node, std::vector<Stage>& stages) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr || array->empty()) {
+      errors_.add(node, "stages is " + toml_type_name(node) + ", expected sections [[stages]]");
+      return;
+    }
+    std::vector<bool> used(names_.size());
+    for (std::size_t i = 0; i < array->size(); ++i) {
+      const toml::table* table = array->get(i)->as_table();
+      if (table == nullptr) {
+        errors_.add(*array->get(i), "a stage is no section, expected [[stages]]");
+        continue;
+      }
+      stages.push_back(read_stage(*table, i + 1 == array->size()));
+      for (const std::size_t gene : stages.back().genes) used[gene] = true;
+    }
+    for (std::size_t gene = 0; gene < used.size(); ++gene) {
+      if (!used[gene]) errors_.add(node, "gene " + names_[gene] + " is in no stage; add it to one");
+    }
+  }
+
+ private:
+  Stage read_stage(const toml::table& table, bool last) {
+    TomlSection section(table, "[[stages]]", errors_);
+    Stage stage;
+    if (const auto genes = section.choices("genes", names_)) {
+      stage.genes = *genes;
+      std::sort(stage.genes.begin(), stage.genes.end());
+      stage.genes.erase(std::unique(stage.genes.begin(), stage.genes.end()), stage.genes.end());
+    }
+    section.read("evaluations", stage.evaluations, 1);
+    section.finish();
+    if (stage.genes.empty()) errors_.add(table, "a stage searches nothing; give it genes = [...]");
+    if (!last && stage.evaluations == 0) {
+      errors_.add(table, "a stage before the last has no end; give it evaluations = N");
+    }
+    return stage;
+  }
+
+  const Config& config_;
+  TomlErrors& errors_;
+  std::vector<std::string> names_;
+};
+
+}  // namespace
+
+Result<StagePlan> read_stages(const Config& config) {
+  ASSIGN_OR_RETURN(const auto parsed, parse_toml(config.text, config.path));
+  TomlErrors errors(config.path);
+  TomlSection top(parsed, "", errors);
+  StagePlan plan;
+  if (const toml::node* node = top.find("stages")) {
+    StageReader(config, errors).read(*node, plan.stages);
+    if (!config.problem.fitness.objectives.empty()) {
+      errors.add(*node,
+                 "stages go on from one best, and a search of several objectives has a "
+                 "front; leave [[stages]] out");
+    }
+  }
+  if (auto validation = top.section("validation")) {
+    if (const auto files = validation->strings(config.problem.windows() ? "folders" : "trials")) {
+      const std::filesystem::path folder = std::filesystem::path(config.path).parent_path();
+      for (const std::string& file : *files) {
+        plan.validation_files.push_back((folder / file).lexically_normal().string());
+      }
+    }
+    validation->finish();
+  }
+  if (!errors.empty()) return errors.error();
+  return plan;
 }
 
 }  // namespace gapfarm

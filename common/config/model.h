@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 

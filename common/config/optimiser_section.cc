@@ -3,8 +3,8 @@
 #include <array>
 #include <string_view>
 
+#include "common/config/config.h"
 #include "common/config/sections.h"
-#include "common/config/stages.h"
 
 namespace gapfarm {
 namespace {

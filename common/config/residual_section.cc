@@ -1,7 +1,7 @@
 #include <optional>
 
 #include "common/config/sections.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {

@@ -1,7 +1,7 @@
 // [evolution], [farm] and [simulate]: how a run goes.
 
 #include "common/config/sections.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {

@@ -1,5 +1,5 @@
 // What a config file says, typed.  Plain data: master and worker build their objects from it.  Of
-// the text only [[stages]] and [validation] are read later (common/config/stages.h).
+// the text only [[stages]] and [validation] are read later (read_stages()).
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "common/problem/problem.h"
 
 namespace gapfarm {

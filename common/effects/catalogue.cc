@@ -1,6 +1,5 @@
 #include "common/effects/catalogue.h"
 
-#include <algorithm>
 #include <numbers>
 #include <utility>
 

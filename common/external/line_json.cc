@@ -1,10 +1,7 @@
 #include "common/external/line_json.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <regex>
-
-#include "common/json/json.h"
 
 namespace gapfarm::line_json {
 

@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "common/base/ranges.h"
 #include "common/pose/pose.h"
 
 namespace gapfarm {

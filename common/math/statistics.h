@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "common/random/stream.h"
 
 namespace gapfarm {

@@ -9,7 +9,6 @@
 #include "common/base/text.h"
 #include "common/parameters/rows.h"
 #include "common/parameters/srv1_robot_file.h"
-#include "common/robot/robot_file.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,6 @@
 
 #include "common/parameters/table.h"
 #include "common/robot/robot.h"
-#include "common/robot/robot_size.h"
 
 namespace gapfarm {
 

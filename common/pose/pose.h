@@ -1,7 +1,9 @@
-// Planar rigid motions, SE(2).  Frames by subscript: X_AB is the pose of frame B seen from A.
+// Planar rigid motions, SE(2), and places.  Frames by subscript: X_AB is the pose of frame B seen
+// from A.
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 
 namespace gapfarm {
 
@@ -46,5 +48,32 @@ Eigen::Matrix3d rotation_about_z(double angle_rad);
 
 // The reflection in the robot's own x-z plane: (x, -y, -theta).
 Pose mirrored(const Pose& X);
+
+// The smallest box along the axes that holds some places.
+struct Extent {
+  double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
+
+  void add(const Pose& X) {
+    x0 = std::min(x0, X.x), x1 = std::max(x1, X.x);
+    y0 = std::min(y0, X.y), y1 = std::max(y1, X.y);
+  }
+  double longer_side() const { return std::max(x1 - x0, y1 - y0); }
+};
+
+// The way's point that is nearest to another point: its share of the way, [0, 1], and its distance.
+struct OnSegment {
+  double share = 0;
+  double distance = 0;
+};
+
+// A way without length is its first point.
+inline OnSegment nearest_on_segment(const Eigen::Vector2d& point, const Eigen::Vector2d& from,
+                                    const Eigen::Vector2d& to) {
+  const Eigen::Vector2d along = to - from;
+  const double length2 = along.squaredNorm();
+  const double share =
+      length2 > 0 ? std::clamp((point - from).dot(along) / length2, 0.0, 1.0) : 0.0;
+  return {share, (from + share * along - point).norm()};
+}
 
 }  // namespace gapfarm

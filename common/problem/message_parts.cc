@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "common/problem/run_files.h"
-
 namespace gapfarm {
 
 void write_external(const Problem& problem, v1::Problem* message) {

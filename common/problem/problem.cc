@@ -1,8 +1,12 @@
 #include "common/problem/problem.h"
 
 #include <cassert>
+#include <filesystem>
 
-#include "common/robot/robot_file.h"
+#include "common/base/hash.h"
+#include "common/base/ranges.h"
+#include "common/robot/robot.h"
+#include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
 namespace {
@@ -120,6 +124,120 @@ const ScenarioForm& scenario_form(std::string_view scenario) {
 
 std::vector<CommandSpec> default_commands(std::string_view scenario) {
   return scenario_form(scenario).commands();
+}
+
+std::vector<std::string> command_names(const std::vector<CommandSpec>& commands) {
+  return mapped(commands, &CommandSpec::name);
+}
+
+Result<RunLog> read_run_folders(std::span<const std::string> folders,
+                                std::span<const std::string> channels) {
+  RunLog all;
+  for (const std::string& folder : folders) {
+    const std::filesystem::path path(folder);
+    ASSIGN_OR_RETURN(auto log, read_runs((path / "commands.csv").string(),
+                                         (path / "poses.csv").string(), channels));
+    log.wheel_channels = all.wheel_channels;
+    const std::filesystem::path wheels = path / "wheels.csv";
+    if (std::error_code none; std::filesystem::exists(wheels, none)) {
+      RETURN_IF_ERROR(read_wheel_speeds(wheels.string(), &log));
+    }
+    for (const auto& [name, read] :
+         {std::pair{"gyro.csv", &read_yaw_rates}, {"returns.csv", &read_returns}}) {
+      const std::filesystem::path beside = path / name;
+      if (std::error_code none; std::filesystem::exists(beside, none)) {
+        RETURN_IF_ERROR(read(beside.string(), &log));
+      }
+    }
+    all.wheel_channels = log.wheel_channels;
+    all.relative = all.relative || log.relative;
+    for (LoggedRun& run : log.runs) {
+      // Runs of two folders may bear one name.
+      if (folders.size() > 1 && run.session.empty()) run.session = path.filename().string();
+      all.runs.push_back(std::move(run));
+    }
+    all.notes.insert(all.notes.end(), log.notes.begin(), log.notes.end());
+  }
+  return all;
+}
+
+Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
+                         Problem* problem) {
+  ASSIGN_OR_RETURN(const auto all, read_run_folders(folders, problem->channels()));
+  ASSIGN_OR_RETURN(auto cut, cut_windows(all, windows));
+  if (problem->ground) {
+    const GroundRobot& robot = problem->ground->robot();
+    if (is_throttled(robot)) {
+      cut = restart_at_measured_speed(all, std::move(cut), windows.run_in_s, kWindowMargin_s);
+    }
+    cut.log.notes.insert(cut.log.notes.end(), robot.notes.begin(), robot.notes.end());
+  }
+  problem->runs = std::move(cut.runs);
+  problem->log = std::move(cut.log);
+  const Result<Problem> sound = from_proto(to_proto(*problem));
+  return sound ? Status() : Status(sound.error());
+}
+
+namespace {
+
+constexpr std::size_t kPayloadShown = 20;
+
+std::string of_birth(const char* what, const v1::StreamKey& stream) {
+  std::string text = what;
+  text += " of birth " + std::to_string(stream.birth_id());
+  if (stream.replicate() != 0) text += ", replicate " + std::to_string(stream.replicate());
+  return text;
+}
+
+const v1::Point* point_of(const v1::Task& task) {
+  if (task.has_evaluate()) return &task.evaluate().point();
+  if (task.has_predict()) return &task.predict().point();
+  if (task.has_simulate()) return &task.simulate().point();
+  return task.has_trace() ? &task.trace().point() : nullptr;
+}
+
+}  // namespace
+
+// Tasks have no map fields, so their serialisation is the same everywhere in one build.
+std::string question_hash(const std::string& problem_hash, const v1::Task& task) {
+  return content_hash(problem_hash + '\n' + task.SerializeAsString());
+}
+
+std::string task_label(const v1::Task& task) {
+  switch (task.kind_case()) {
+    case v1::Task::kEvaluate:
+      return of_birth("evaluation", task.evaluate().stream());
+    case v1::Task::kPredict:
+      return of_birth("prediction", task.predict().stream());
+    case v1::Task::kSimulate:
+      return "simulation of a session";
+    case v1::Task::kTrace:
+      return "trace of command " + task.trace().command().name();
+    case v1::Task::kEcho:
+      return "echo of '" + task.echo().payload().substr(0, kPayloadShown) + "'";
+    default:
+      return "task";
+  }
+}
+
+std::string point_settings(const Problem& problem, const v1::Task& task) {
+  const v1::Point* point = point_of(task);
+  if (point == nullptr) return {};
+  const Genome genome(point->genome().begin(), point->genome().end());
+  if (!genome.empty() && genome.size() != problem.genes.size()) return {};
+  std::string text;
+  const auto add = [&](std::size_t row, double value) {
+    text += std::string(text.empty() ? "" : " ") + "--set " + problem.table()[row].key + "=" +
+            problem.table().text_of(row, value);
+  };
+  const ParameterValues values = problem.values_of(genome);
+  for (std::size_t i = 0; i < genome.size(); ++i) {
+    add(problem.genes[i].row, values[problem.genes[i].row]);
+  }
+  for (const v1::Override& override : point->overrides()) {
+    if (override.parameter() < values.size()) add(override.parameter(), override.value());
+  }
+  return text;
 }
 
 }  // namespace gapfarm

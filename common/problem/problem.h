@@ -14,6 +14,7 @@
 #include "common/parameters/table.h"
 #include "common/parameters/tracked.h"
 #include "common/problem/piece.h"
+#include "common/recordings/run.h"
 #include "common/recordings/windows.h"
 #include "common/residual/outliers.h"
 #include "common/trials/trial.h"
@@ -21,7 +22,8 @@
 
 namespace gapfarm::v1 {
 class Override;
-}
+class Task;
+}  // namespace gapfarm::v1
 
 namespace gapfarm {
 
@@ -181,5 +183,31 @@ Trial from_proto(const v1::Trial& trial);
 // Deterministic bytes and their content hash.
 std::string serialise(const v1::Problem& message);
 std::string problem_hash(const v1::Problem& message);
+
+// What a problem's log is read by: its commands' names, and its runs from their files.
+
+std::vector<std::string> command_names(const std::vector<CommandSpec>& commands);
+
+// Reads commands.csv and poses.csv of each folder, and wheels.csv where it is, one after another.
+Result<RunLog> read_run_folders(std::span<const std::string> folders,
+                                std::span<const std::string> channels);
+
+// Reads commands.csv and poses.csv of each folder, cuts them into windows and makes those the
+// problem's trials, checked as from_proto() does.  REQUIRES: a problem with a robot.
+Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
+                         Problem* problem);
+
+// What a task asks, whoever asks it and when: evaluation is pure, so equal questions have equal
+// answers.
+
+// Hash of the task and the problem it is about.
+std::string question_hash(const std::string& problem_hash, const v1::Task& task);
+
+// The task in a few words, for people: "evaluation of birth 17, replicate 2".
+std::string task_label(const v1::Task& task);
+
+// What the task's genome and overrides make of the problem's values, as options of `simulate`:
+// "--set friction=0.41 --set mass=0.3"; "" where it changes none.
+std::string point_settings(const Problem& problem, const v1::Task& task);
 
 }  // namespace gapfarm

@@ -10,7 +10,7 @@
 #include "common/base/hash.h"
 #include "common/base/text.h"
 #include "common/problem/message_parts.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {

@@ -7,7 +7,6 @@
 
 #include <cassert>
 #include <cerrno>
-#include <cstdint>
 
 namespace gapfarm {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/progress/number_text.h"
+#include "common/base/text.h"
 
 namespace gapfarm {
 namespace {

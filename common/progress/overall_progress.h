@@ -1,6 +1,7 @@
 // How far a command of several stages is, and how long the whole of it will still take.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -114,6 +115,44 @@ class WorkerWait {
   std::string where_;    // "at tcp://..."
   std::string connect_;  // an endpoint for gapfarm-worker; empty: only local workers
   std::optional<double> since_s_;
+};
+
+// What a long command has found so far, for those who watch it: what it ends with may differ.
+
+struct Finding {
+  std::string about;  // "the noise": a later finding about the same takes its place
+  std::string text;   // sentences
+  // A small table; empty: none.
+  std::pair<std::string, std::string> columns;  // what stands above them, with the unit
+  std::vector<std::pair<std::string, std::string>> rows;
+};
+
+using OnFinding = std::function<void(Finding)>;
+
+// Which stage is on, and how long each took.
+
+class StageClock {
+ public:
+  explicit StageClock(std::function<void(const std::string&)> on_stage)
+      : on_stage_(std::move(on_stage)) {}
+
+  // Ends the present one; empty: none begins.
+  void begin(const std::string& name) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!present.empty()) {
+      timing_s.emplace_back(present, std::chrono::duration<double>(now - began_).count());
+    }
+    present = name;
+    began_ = now;
+    if (on_stage_ && !name.empty()) on_stage_(name);
+  }
+
+  std::string present;
+  std::vector<std::pair<std::string, double>> timing_s;
+
+ private:
+  std::function<void(const std::string&)> on_stage_;
+  std::chrono::steady_clock::time_point began_;
 };
 
 }  // namespace gapfarm

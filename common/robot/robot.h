@@ -185,4 +185,28 @@ Status complete_robot(GroundRobot* robot);
 // What complete_robot() asks of its result, for robots that come from elsewhere.
 Status check_robot(const GroundRobot& robot);
 
+// Sizes of a tracked robot that are no parameters.
+struct RobotSize {
+  // The outline; the mass is spread over this box for the moments of inertia.
+  double body_length_m = 0, body_width_m = 0, body_height_m = 0;
+  // Spheres on which the tread model stands.
+  double contact_radius_m = 0;
+  // Wheels of the wheel model; surface speed = radius * wheel speed.
+  double wheel_radius_m = 0, wheel_half_width_m = 0;
+  // Of a contact, in Bullet's units of 1 / mass: a heavy robot must not sink in.
+  double contact_softness = 0;
+
+  bool operator==(const RobotSize&) const = default;
+};
+
+// Robot files: robot.toml, read and written (docs/formats.md).
+
+// A completed robot (complete_robot()).  The error lists everything that is wrong, a line each:
+// "file:line:column: sentence", with "did you mean" for unknown words.
+Result<GroundRobot> parse_robot(std::string_view text, const std::string& path);
+Result<GroundRobot> read_robot(const std::string& path);
+
+// The text of robot.toml; reads back as the same robot, every double as the same bits.
+std::string format_robot(const GroundRobot& robot);
+
 }  // namespace gapfarm

@@ -1,12 +1,11 @@
 // Reading robot.toml.
 
-#include "common/robot/robot_file.h"
-
 #include <algorithm>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/config/toml_section.h"
+#include "common/robot/robot.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 

@@ -2,20 +2,92 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/pose/pose.h"
 #include "common/recordings/run.h"
+#include "common/recordings/windows.h"
 #include "common/robot/robot.h"
 #include "common/robot/robot_drive.h"
-#include "common/score/floor_parts.h"
 #include "common/score/kinematic.h"
-#include "common/score/omni_inverse.h"
+#include "common/trials/trial.h"
 
 namespace gapfarm {
+
+// Parts of a floor on which wheels travel less far than elsewhere, or farther.
+
+// Where a robot is and which way it heads.
+struct RobotPlace {
+  Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d ahead = Eigen::Vector2d::UnitX();  // of length 1
+};
+
+// Ratios are of how far a wheel travels there.
+class FloorParts {
+ public:
+  // Before a value's name: of a floor that is known to be so, whatever else there is.
+  static constexpr std::string_view kKnown = "known_";
+
+  // Places are counted from `origin_m` of the world.
+  explicit FloorParts(const Eigen::Vector2d& origin_m) : origin_m_(origin_m) {}
+
+  // Whether a value of the kinematic model (common/score/kinematic.h) is one of these.
+  static bool has(std::string_view name);
+  // Takes it; others are none of its business.
+  void put(std::string_view name, double value);
+
+  bool even() const;
+  // Under a wheel of a robot that stands there; 1 where nobody knows where that is.
+  double under(const RobotPlace* at, const RobotWheel& wheel) const;
+  // The mean of all wheels, or of the driven ones.
+  double under_wheels(const RobotPlace* at, const GroundRobot& robot, bool driven) const;
+
+ private:
+  struct Parts {
+    double edge_rad = 0, edge_m = 0, edge_ratio = 1;
+    Eigen::Vector2d beyond = Eigen::Vector2d::UnitX();  // of the edge, by its angle
+    double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0, patch_ratio = 1;
+  };
+  struct Row {
+    std::string_view name;
+    double Parts::*value;
+  };
+  static const Row* find(std::string_view name);
+
+  Eigen::Vector2d origin_m_;
+  Parts parts_, known_;
+};
+
+// How omni and mecanum wheels move a robot: the inverse of its wheels' geometry, with slip.
+
+// Traction 1: e1 (v + w x p) = s of every driven wheel, in the least-squares sense, e1 being the
+// axle of the roller on the floor.  Where rollers resist being rolled aside, the forces on all
+// wheels balance: each slips along e1 in proportion to what it pulls with, and is dragged across by
+// (1 / traction - 1) of that, both in proportion to its load.  On alike wheels all round, the
+// traction is what a robot that does not turn goes of its wheels' way.
+class OmniWheels {
+ public:
+  explicit OmniWheels(const GroundRobot& robot);
+
+  // `load_m`: where the weight stands, R; of all loads that balance it there the evenest.
+  void load(const Eigen::Vector2d& load_m);
+
+  // 3 by driven wheels: from the speeds of their surfaces along e1 to the robot's twist.  One
+  // traction a driven wheel.
+  Eigen::MatrixXd inverse(const Eigen::VectorXd& tractions) const;
+
+  Eigen::Index wheels() const { return pulled_.rows(); }
+
+ private:
+  Eigen::MatrixXd pulled_, dragged_;  // what a twist is at each wheel, along e1 and across
+  Eigen::MatrixXd places_m_;          // 2 by wheels
+  Eigen::VectorXd loads_;
+};
 
 // The robot and the gains of its motion at some values.
 class KinematicBody {
@@ -81,6 +153,37 @@ class KinematicBody {
   // Of the tractions that wheels had last: they change while wheels cross to another floor.
   mutable Eigen::VectorXd tractions_;
   mutable Eigen::MatrixXd inverse_;
+};
+
+// Runs and their windows as kinematics are asked about them: many times, at other values.
+
+class KinematicPaths {
+ public:
+  // Both outlive it.
+  KinematicPaths(std::span<const CommandedRun> runs, std::span<const Trial> trials);
+
+  // The end of every window, as kinematic_ends() has it.  Not by several threads at a time.
+  std::vector<Pose> ends(const GroundRobot& robot, const Kinematics& kinematics) const;
+
+ private:
+  struct Path {
+    std::vector<double> times;        // that poses are asked for
+    std::vector<RobotPlace> markers;  // as measured, from the run's start on; once they matter
+  };
+  // Of a window, in its run's poses.
+  struct Ends {
+    std::size_t start, end;
+  };
+
+  void measure() const;
+  RobotPlace marker(std::size_t run, double t_s) const;
+  std::vector<Pose> poses(const KinematicBody& body, std::size_t run) const;
+
+  std::span<const CommandedRun> runs_;
+  std::span<const Trial> trials_;
+  double began_s_ = 0;
+  mutable std::vector<Path> paths_;
+  std::vector<Ends> ends_;
 };
 
 }  // namespace gapfarm

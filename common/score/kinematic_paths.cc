@@ -1,9 +1,9 @@
-#include "common/score/kinematic_paths.h"
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <map>
+
+#include "common/score/kinematic_body.h"
 
 namespace gapfarm {
 namespace {

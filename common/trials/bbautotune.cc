@@ -1,5 +1,3 @@
-#include "common/trials/bbautotune.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -7,6 +5,7 @@
 
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
+#include "common/trials/text/trial_parser.h"
 
 namespace gapfarm {
 namespace {

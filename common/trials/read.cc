@@ -6,10 +6,8 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/trials/bbautotune.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
-#include "common/trials/mark.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/text/mistakes.h"
 #include "common/trials/text/trial_parser.h"

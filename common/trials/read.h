@@ -2,6 +2,7 @@
 // rows with mistakes omitted.
 #pragma once
 
+#include <Eigen/Core>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,7 +17,7 @@ struct ReadOptions {
   bool skip_invalid = false;   // leave rows with mistakes out, with a note for each
   bool name_sessions = false;  // put a file's name before its sessions': "monday/s1"
   // Files of paths that are read whatever they say; a paths.csv beside a log is read when its mark
-  // names the log (mark.h), else a note says that it was not.
+  // names the log (log_marks()), else a note says that it was not.
   std::vector<std::string> paths;
 };
 
@@ -39,5 +40,19 @@ Result<TrialLog> read_trials(const std::string& path, std::span<const std::strin
 Result<TrialLog> read_trial_files(std::span<const std::string> paths,
                                   std::span<const std::string> commands,
                                   const ReadOptions& options = {});
+
+// blendersim's way-point logs: where a robot was seen and where it was sent.
+
+struct WaypointLog {
+  std::vector<PathSample> path;          // camera poses from the first order on, t_s since then
+  std::vector<Eigen::Vector2d> targets;  // m, in the order in which the robot made for them
+};
+
+// Lines "HH:MM:SS:mmm:uuu [ SENT ] CAMPOSE id x y theta ..." (whole centimetres, radians) and
+// "... WAYPOINTS id n x1 y1 ...", the way-points still ahead; the first of them is the target, and
+// "1 0 0" is none.  Times may pass midnight once.  Errors name the line; also no target or no pose
+// after the first.
+Result<WaypointLog> parse_waypoint_log(std::string_view text, const std::string& file);
+Result<WaypointLog> read_waypoint_log(const std::string& file);
 
 }  // namespace gapfarm

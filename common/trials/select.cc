@@ -1,9 +1,8 @@
-#include "common/trials/select.h"
-
 #include <algorithm>
 
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
+#include "common/trials/trial.h"
 
 namespace gapfarm {
 namespace {

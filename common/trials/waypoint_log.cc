@@ -1,11 +1,10 @@
-#include "common/trials/waypoint_log.h"
-
 #include <cmath>
 #include <optional>
 
 #include "common/base/text.h"
 #include "common/trials/dialect.h"
 #include "common/trials/files.h"
+#include "common/trials/read.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {

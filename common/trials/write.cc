@@ -7,9 +7,9 @@
 
 #include "common/base/text.h"
 #include "common/trials/files.h"
-#include "common/trials/mark.h"
-#include "common/trials/text/columns.h"
+#include "common/trials/format.h"
 #include "common/trials/text/csv.h"
+#include "common/trials/text/trial_parser.h"
 
 namespace gapfarm {
 namespace {

@@ -24,9 +24,9 @@ struct TrialFile {
 };
 
 // The files that a log at `path` is made of, in the order to write them: paths.csv, marked as this
-// log's (mark.h), and tips.csv beside it when it has them, then `path` itself.  Errors: what would
-// not read back (an empty session, extra values without a column, a repeated trial, a number that
-// is not finite), a path named like what lies beside a log.
+// log's (log_marks()), and tips.csv beside it when it has them, then `path` itself.  Errors: what
+// would not read back (an empty session, extra values without a column, a repeated trial, a number
+// that is not finite), a path named like what lies beside a log.
 Result<std::vector<TrialFile>> trial_files(const TrialLog& log, const std::string& path);
 
 // Where trial_files() will put a log that is not there yet.

@@ -1,5 +1,3 @@
-#include "master/cli/app.h"
-
 #include <signal.h>
 #include <unistd.h>
 
@@ -16,6 +14,7 @@
 #include "common/process/stop.h"
 #include "common/usage/usage.h"
 #include "master/cli/run_arguments.h"
+#include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 

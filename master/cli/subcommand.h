@@ -4,10 +4,13 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "common/base/result.h"
-#include "master/command/context.h"
+#include "master/command/console.h"
 
 namespace gapfarm {
 
@@ -26,5 +29,34 @@ std::span<const Subcommand> subcommands();
 
 #define COMMAND(folder, file, name, summary, group) SubcommandRun setup_##file(CLI::App& app);
 #include "master/cli/commands.inc"
+
+// The command line as a whole: every subcommand with its options, and what its words mean.
+
+// What was parsed lives in it.
+struct Program {
+  std::unique_ptr<CLI::App> app;
+  std::vector<SubcommandRun> runs;  // of subcommands(), in order
+  bool json = false;                // --json, which every command takes
+};
+
+std::unique_ptr<Program> make_program();
+
+// Parses `words`, without the program's name; "help COMMAND" is "COMMAND --help".  Throws
+// CLI::ParseError.
+void parse_arguments(Program& program, std::vector<std::string> arguments);
+
+// What may stand next on a command line: for the completion of shells.
+
+struct CompletionCandidate {
+  std::string word;     // ends in '/' or '=' where more of the word is to follow
+  std::string summary;  // one line; may be empty
+};
+
+// Candidates for the last of `words`, which may be empty or begun; the others stand before it, the
+// program's name omitted.  Knows commands, options and their choices; configs, runs, models and
+// diagnoses by what lies in the folders; effects, parameters and commands of the config among the
+// words, else of the nominal robot.
+std::vector<CompletionCandidate> completion_candidates(const CLI::App& app,
+                                                       const std::vector<std::string>& arguments);
 
 }  // namespace gapfarm

@@ -7,8 +7,6 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "common/json/json.h"
-
 namespace gapfarm {
 namespace {
 

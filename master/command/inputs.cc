@@ -11,7 +11,7 @@
 #include "common/base/text.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
-#include "master/io/log_checks/sanity.h"
+#include "master/io/log_checks/log_checks.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"
 

@@ -15,10 +15,8 @@
 #include "common/log/log.h"
 #include "common/net/keys.h"
 #include "common/problem/problem.h"
-#include "common/problem/run_files.h"
 #include "common/trials/read.h"
 #include "master/command/console.h"
-#include "master/command/context.h"
 #include "master/farm/socket_farm.h"
 #include "master/run/stored_run.h"
 

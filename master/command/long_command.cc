@@ -18,7 +18,7 @@
 #include "common/json/json.h"
 #include "common/process/child.h"
 #include "common/trials/files.h"
-#include "master/command/context.h"
+#include "master/command/console.h"
 
 namespace gapfarm {
 

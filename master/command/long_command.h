@@ -13,7 +13,7 @@
 #include "master/command/console.h"
 #include "master/farm/farm.h"
 #include "master/store/answer_store.h"
-#include "master/store/command_record.h"
+#include "master/store/records.h"
 #include "master/store/run_lock.h"
 
 namespace gapfarm {

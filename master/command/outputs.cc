@@ -14,8 +14,8 @@
 #include "common/base/text.h"
 #include "common/config/config.h"
 #include "common/trials/files.h"
-#include "common/trials/select.h"
-#include "master/store/command_record.h"
+#include "common/trials/trial.h"
+#include "master/store/records.h"
 
 namespace gapfarm {
 namespace {

@@ -9,7 +9,7 @@
 #include "common/config/settings.h"
 #include "common/trials/trial.h"
 #include "master/command/inputs.h"
-#include "master/experiments/influence/paths.h"
+#include "master/experiments/influence/influence.h"
 
 namespace gapfarm {
 

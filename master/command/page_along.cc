@@ -16,7 +16,7 @@
 #include "common/base/text.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"
-#include "master/command/context.h"
+#include "master/command/console.h"
 #include "master/serve/request.h"
 
 namespace gapfarm {

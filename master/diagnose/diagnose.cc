@@ -10,13 +10,13 @@
 #include "common/base/text.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
-#include "common/progress/stage_clock.h"
-#include "common/trials/select.h"
+#include "common/progress/overall_progress.h"
+#include "common/trials/trial.h"
 #include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/steps/steps.h"
 #include "master/diagnose/steps/watch.h"
-#include "master/io/log_checks/sanity.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {

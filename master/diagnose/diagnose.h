@@ -11,11 +11,11 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "common/progress/finding.h"
+#include "common/progress/overall_progress.h"
 #include "master/diagnose/result/diagnosis.h"
 #include "master/farm/farm.h"
 #include "master/infer/predictor.h"
-#include "master/io/log_checks/finding.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 

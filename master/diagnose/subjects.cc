@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "common/base/ranges.h"
-#include "common/parameters/push.h"
-#include "common/pose/extent.h"
+#include "common/parameters/table.h"
+#include "common/pose/pose.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/free_commands.h"

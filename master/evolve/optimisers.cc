@@ -5,7 +5,6 @@
 #include <cassert>
 
 #include "gapfarm/v1/record.pb.h"
-#include "master/evolve/genetic/genetic.h"
 #include "master/evolve/individual.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/methods/cma_es.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/config/stages.h"
+#include "common/config/config.h"
 #include "common/parameters/table.h"
 #include "master/evolve/optimiser.h"
 
@@ -53,5 +53,34 @@ Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
 // The best genomes of the completed stages, in order, out of a state of `genes` genes; empty when
 // the state is not a staged optimiser's.
 std::vector<Genome> stage_results(std::string_view state, std::size_t genes);
+
+// The searches by populations and operators: of one cost, and of several objectives.
+
+// A genetic algorithm with elitism, self-adapted operators and restarts.
+//
+// Randomness: child `birth_id` of generation g draws from Stream{run_seed, kEvolution, g, birth_id,
+// 0} and nothing else, so a generation does not depend on how many draws another child made.
+//
+// Noise: when scores are noisy, two elites at least are kept (if any), and each elite is scored
+// until it has `elite_replicates`.  Only fully scored individuals compete for best(): the lucky
+// single score leads to a re-score, not to the title.
+//
+// Errors: a population below 2 or not above the elites, no operators, a probability outside [0, 1].
+Result<std::unique_ptr<Optimiser>> make_genetic(const OptimiserSetup& setup);
+
+// NSGA-II (Deb, Pratap, Agarwal and Meyarivan, IEEE Trans. Evol. Comp. 6, 2002): a search of
+// several objectives at once.  Its members are a population of as many as differ, in the order of
+// fronts and crowding; the best is the knee of the first front.  Constrained domination: what ended
+// well before what violates constraints less, before what failed.  Without objectives the cost is
+// the only one.
+//
+// Children: simulated binary crossover (Deb and Agrawal 1995) and polynomial mutation (Deb and
+// Goyal 1996) of reals and integers; unordered genes are exchanged and drawn anew.  A
+// front is pruned one by one, distances worked out anew each time (Kukkonen and Deb, CEC 2006).
+//
+// Randomness: each pair of children draws from Stream{run_seed, kEvolution, generation, birth id of
+// the first, 0}.  Noise: members of the first front are scored once more a generation until they
+// have `elite_replicates` scores.
+Result<std::unique_ptr<Optimiser>> make_nsga2(const OptimiserSetup& setup);
 
 }  // namespace gapfarm

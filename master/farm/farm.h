@@ -2,17 +2,47 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <iterator>
+#include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "gapfarm/v1/problem.pb.h"
 #include "gapfarm/v1/task.pb.h"
-#include "master/farm/sites/fleet_status.h"
 
 namespace gapfarm {
+
+// What stands on a cluster for a master, as its fleet last reported it.
+
+// Counts are workers.
+struct FleetStatus {
+  std::string name;
+  std::string system;  // "slurm"
+  std::string host;    // where it is managed
+  unsigned wanted = 0, queued = 0, running = 0;
+  std::uint64_t lost = 0;  // ended unasked before they had joined
+  std::string why;         // not all that are wanted run; or empty
+};
+
+// Who a worker is, for whoever keeps its answers longer than it stays.
+
+using WorkerId = std::uint64_t;
+
+struct WorkerIdentity {
+  WorkerId id = 0;
+  std::string name;  // its own, unique: a process that replaces it has another
+  std::string host;
+  std::string numeric_class;
+};
+
+// How many workers each host has.
+using HostCounts = std::map<std::string, unsigned>;
+
+using WorkerIdentityPtr = std::shared_ptr<const WorkerIdentity>;
 
 struct WorkerStatus {
   std::string name;

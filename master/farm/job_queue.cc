@@ -6,7 +6,7 @@
 #include <random>
 
 #include "common/base/ranges.h"
-#include "common/problem/question.h"
+#include "common/problem/problem.h"
 #include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {

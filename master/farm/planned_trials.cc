@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <string>
 
 #include "common/base/ranges.h"
 #include "common/random/stream.h"

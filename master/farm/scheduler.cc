@@ -6,7 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/net/envelope.h"
-#include "common/problem/question.h"
+#include "common/problem/problem.h"
 
 namespace gapfarm {
 namespace {

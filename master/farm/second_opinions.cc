@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "common/base/hash.h"
-#include "common/problem/question.h"
+#include "common/problem/problem.h"
 
 namespace gapfarm {
 namespace {

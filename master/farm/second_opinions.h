@@ -8,7 +8,7 @@
 #include <unordered_map>
 
 #include "gapfarm/v1/farm.pb.h"
-#include "master/farm/worker_identity.h"
+#include "master/farm/farm.h"
 
 namespace gapfarm {
 

@@ -6,7 +6,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
-#include "common/net/envelope.h"
 #include "common/problem/problem.h"
 #include "master/farm/local_workers.h"
 

@@ -11,8 +11,6 @@
 #include "common/process/process_pool.h"
 #include "gapfarm/v1/farm.pb.h"
 #include "master/farm/farm.h"
-#include "master/farm/sites/fleet_status.h"
-#include "master/farm/worker_identity.h"
 
 namespace gapfarm {
 

@@ -7,7 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "common/math/statistics.h"
-#include "common/pose/extent.h"
+#include "common/pose/pose.h"
 #include "common/recordings/windows.h"
 #include "common/svg/svg.h"
 

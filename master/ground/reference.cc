@@ -11,12 +11,12 @@
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "common/score/floor_parts.h"
+#include "common/score/kinematic_body.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/fit/scans.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
-#include "master/io/log_checks/run_checks.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {

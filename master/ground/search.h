@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "common/base/result.h"
-#include "common/progress/finding.h"
+#include "common/progress/overall_progress.h"
 #include "common/recordings/run.h"
 #include "common/robot/robot.h"
 #include "common/trials/pose_readings.h"
@@ -20,7 +20,7 @@
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/free_residual.h"
 #include "master/ground/hypotheses.h"
-#include "master/io/log_checks/run_checks.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 

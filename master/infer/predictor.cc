@@ -4,7 +4,7 @@
 #include <numeric>
 #include <set>
 
-#include "common/math/digits.h"
+#include "common/base/text.h"
 #include "common/score/motion_model.h"
 
 namespace gapfarm {

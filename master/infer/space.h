@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "common/parameters/table.h"
 #include "master/infer/predictor.h"
 

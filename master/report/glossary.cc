@@ -1,5 +1,3 @@
-#include "master/report/glossary.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <cassert>

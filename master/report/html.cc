@@ -11,7 +11,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/math/digits.h"
 
 namespace gapfarm {
 namespace {

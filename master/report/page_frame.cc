@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "common/json/json.h"
 #include "master/report/html.h"
 #include "master/report/page_texts.h"
 

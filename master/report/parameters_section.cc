@@ -3,9 +3,8 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "master/report/glossary.h"
 #include "master/report/html.h"
-#include "master/report/report_sections.h"
+#include "master/report/report_html.h"
 
 namespace gapfarm {
 namespace {

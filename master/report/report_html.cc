@@ -9,10 +9,8 @@
 
 #include "common/base/ranges.h"
 #include "master/diagnose/result/diagnosis_json.h"
-#include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/report/report_sections.h"
 
 namespace gapfarm {
 namespace {

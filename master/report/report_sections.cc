@@ -1,5 +1,3 @@
-#include "master/report/report_sections.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -7,8 +5,8 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "master/report/glossary.h"
 #include "master/report/html.h"
+#include "master/report/report_html.h"
 
 namespace gapfarm {
 namespace {

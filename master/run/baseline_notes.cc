@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "common/problem/run_files.h"
 #include "common/trials/read.h"
 
 namespace gapfarm {

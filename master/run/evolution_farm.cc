@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/problem/question.h"
-#include "common/progress/number_text.h"
+#include "common/base/text.h"
+#include "common/problem/problem.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {

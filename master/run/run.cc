@@ -7,8 +7,6 @@
 #include <filesystem>
 
 #include "common/base/clock.h"
-#include "common/config/config.h"
-#include "common/problem/run_files.h"
 #include "common/trials/read.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/optimisers.h"

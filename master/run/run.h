@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/config/config.h"
 #include "common/config/settings.h"
-#include "common/config/stages.h"
 #include "common/log/log.h"
 #include "common/problem/problem.h"
 #include "common/trials/trial.h"

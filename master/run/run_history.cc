@@ -1,5 +1,3 @@
-#include "master/run/run_history.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -8,8 +6,9 @@
 #include <set>
 #include <utility>
 
-#include "common/progress/number_text.h"
+#include "common/base/text.h"
 #include "master/report/html.h"
+#include "master/run/run_page.h"
 #include "master/store/run_lock.h"
 
 namespace gapfarm {

@@ -13,16 +13,13 @@
 #include "common/base/text.h"
 #include "common/config/config.h"
 #include "common/config/model.h"
-#include "common/config/stages.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "common/trials/files.h"
 #include "master/report/html.h"
 #include "master/report/prediction_table.h"
 #include "master/run/baseline_notes.h"
-#include "master/run/run_history.h"
 #include "master/run/stored_run.h"
-#include "master/store/run_reader.h"
 
 namespace gapfarm {
 namespace {

@@ -8,10 +8,11 @@
 #include "common/problem/problem.h"
 #include "master/evolve/evolve.h"
 #include "master/farm/farm.h"
-#include "master/report/figures/pose_picture.h"
+#include "master/report/figures/figures.h"
 #include "master/report/run/run_report.h"
 #include "master/run/run.h"
 #include "master/store/records.h"
+#include "master/store/run_reader.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
@@ -42,5 +43,34 @@ std::vector<std::string> output_files(const Problem& problem);
 Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
                      const EvolveSummary& summary, Farm& farm,
                      const std::vector<ScoreRow>& validated, RunWatcher& watcher);
+
+// What a run's store shows of how it went on, for its page.
+
+// Fills in operators, densities, elite, genomes and the farm.  Of long runs some generations are
+// read, so that any run's page takes as long as another's.  Errors: of reading the store.
+Status add_history(const RunReader& reader, const Problem& problem,
+                   const std::vector<StoredGeneration>& generations, const RunQuestion& question,
+                   RunReport* report);
+
+// Who came and went.  `alive`: the run's last master is still there.
+RunTimeline timeline_of(const std::vector<StoredWorkerEvent>& events, double heartbeat_unix_s,
+                        bool alive);
+
+// Workers, their timeline and failures, tallies, what was given up, the end of the log.  Errors: of
+// reading the store.
+Status add_farm(const RunReader& reader, RunReport* report);
+
+// The first of `last` over its objectives, where there are several, and its genes.
+RunElite run_elite(const Problem& problem, const std::vector<StoredIndividual>& last);
+
+// `members`: each once, with a fitness.  The importance of a gene is first_order_index() on the
+// ranks of the fitness, or of each of several objectives: ranks, since a search that has settled
+// leaves few, wild values far away.
+RunSample run_sample(const Problem& problem, const std::vector<StoredIndividual>& members);
+
+// The whole history as CSV, a row an individual in the order of birth, as it first appeared: its
+// parameters, objectives, and what the run had spent by the end of its generation.  Errors: of
+// reading the store.
+Result<std::string> history_csv(const RunReader& reader);
 
 }  // namespace gapfarm

@@ -10,7 +10,7 @@
 #include "common/math/statistics.h"
 #include "common/trials/text/csv.h"
 #include "master/report/html.h"
-#include "master/run/run_history.h"
+#include "master/run/run_page.h"
 
 namespace gapfarm {
 namespace {

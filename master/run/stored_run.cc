@@ -6,7 +6,6 @@
 
 #include "common/base/text.h"
 #include "common/config/config.h"
-#include "common/config/stages.h"
 #include "common/json/json.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"

@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "common/progress/number_text.h"
-#include "master/report/glossary.h"
+#include "common/base/text.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 #include "master/serve/pages.h"

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "master/store/command_record.h"
 #include "master/store/records.h"
 
 namespace gapfarm {

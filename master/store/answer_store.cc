@@ -4,7 +4,6 @@
 
 #include "common/base/hash.h"
 #include "common/problem/problem.h"
-#include "common/problem/question.h"
 #include "master/store/tables.h"
 
 namespace gapfarm {

@@ -11,7 +11,6 @@
 #include "common/base/build_info.h"
 #include "common/base/text.h"
 #include "common/json/json.h"
-#include "common/progress/number_text.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"
 

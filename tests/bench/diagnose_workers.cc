@@ -12,7 +12,7 @@
 #include <memory>
 
 #include "common/config/config.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "common/trials/read.h"
 #include "master/diagnose/diagnose.h"
 #include "worker/evaluate.h"

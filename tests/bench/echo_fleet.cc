@@ -23,7 +23,7 @@
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
 #include "common/net/envelope.h"
-#include "worker/pump.h"
+#include "worker/session.h"
 
 namespace gapfarm {
 namespace {

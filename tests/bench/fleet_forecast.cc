@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "master/report/figures/line_chart.h"
+#include "master/report/figures/figures.h"
 #include "tests/bench/fleet_simulation.h"
 
 namespace {

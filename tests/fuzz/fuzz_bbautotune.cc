@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "common/trials/bbautotune.h"
 #include "common/trials/read.h"
+#include "common/trials/text/trial_parser.h"
 #include "common/trials/write.h"
 #include "tests/fuzz/fuzz_target.h"
 

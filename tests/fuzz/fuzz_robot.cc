@@ -1,7 +1,7 @@
 // Robot files: no crash, errors with places, and what is accepted reads back as it is written and
 // has a table of parameters.
 #include "common/parameters/ground.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace gapfarm {

@@ -1,5 +1,5 @@
 // URDFs: no crash, errors with places, and what is understood can be drawn.
-#include "master/io/robot_files/robot_text.h"
+#include "master/io/robot_files/understand.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace gapfarm {

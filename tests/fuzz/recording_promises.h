@@ -1,7 +1,7 @@
 // What holds of every recording, whatever it was read from.
 #pragma once
 
-#include "master/io/logs/to_runs.h"
+#include "master/io/logs/column_map.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace gapfarm {

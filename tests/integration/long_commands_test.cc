@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "master/store/command_record.h"
+#include "master/store/records.h"
 #include "tests/integration/demo_config.h"
 #include "tests/integration/diagnose_program.h"
 #include "tests/integration/run_program.h"

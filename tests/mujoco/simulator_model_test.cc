@@ -9,7 +9,7 @@
 #include <fstream>
 #include <memory>
 
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 
 namespace gapfarm::simulator_model_test {
 namespace {

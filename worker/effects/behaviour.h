@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "common/effects/catalogue.h"
-#include "common/effects/start_turns.h"
 #include "common/parameters/table.h"
 #include "common/pose/pose.h"
 #include "common/random/stream.h"

@@ -1,7 +1,6 @@
 #include "worker/scenarios/program.h"
 
 #include "common/base/clock.h"
-#include "worker/scenarios/outcome.h"
 
 namespace gapfarm {
 

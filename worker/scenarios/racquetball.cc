@@ -1,9 +1,8 @@
-#include "common/parameters/racquetball.h"
-
-#include "common/random/stream.h"
-#include "worker/scenarios/outcome.h"
-#include "worker/scenarios/scenario.h"
 #include "worker/sim/racquetball.h"
+
+#include "common/parameters/table.h"
+#include "common/random/stream.h"
+#include "worker/scenarios/scenario.h"
 
 namespace gapfarm {
 namespace {

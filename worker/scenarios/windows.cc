@@ -6,7 +6,6 @@
 
 #include "common/parameters/ground.h"
 #include "common/score/fitness.h"
-#include "worker/scenarios/outcome.h"
 
 namespace gapfarm {
 namespace {

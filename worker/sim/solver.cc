@@ -1,7 +1,7 @@
-#include "worker/sim/solver.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "worker/sim/world.h"
 
 namespace gapfarm {
 namespace {

@@ -35,7 +35,7 @@ struct CsvField {
 };
 
 // A line that begins with '#' before the header.  A header whose first name begins so is none: it
-// has commas, which only a mark ("# log: ...", mark.h) may have too.
+// has commas, which only a mark ("# log: ...", format.h) may have too.
 bool is_comment(std::string_view line);
 
 struct CsvRow {

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "common/base/text.h"
-#include "common/trials/text/columns.h"
 
 namespace gapfarm {
 namespace {

@@ -8,12 +8,56 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/text/mistakes.h"
 #include "common/trials/trial.h"
 
 namespace gapfarm {
+
+// The columns of the trial format, in the order that the writer writes them.
+
+enum TrialColumn : std::size_t {
+  kSession,
+  kTrial,
+  kTime,
+  kCommand,
+  kLeft,
+  kRight,
+  kDuration,
+  kX0,
+  kY0,
+  kTheta0,
+  kX1,
+  kY1,
+  kTheta1
+};
+inline const std::vector<std::string>& trial_columns() {
+  static const std::vector<std::string> names = {
+      "session", "trial", "t",      "command", "left", "right", "duration",
+      "x0",      "y0",    "theta0", "x1",      "y1",   "theta1"};
+  return names;
+}
+
+enum PathColumn : std::size_t { kPathSession, kPathTrial, kPathTime, kPathX, kPathY, kPathTheta };
+inline const std::vector<std::string>& path_columns() {
+  static const std::vector<std::string> names = {"session", "trial", "t", "x", "y", "theta"};
+  return names;
+}
+
+// Of a push log; the piece stands where a trial log has its command.
+inline const std::vector<std::string>& push_columns() {
+  static const std::vector<std::string> names = {"session", "trial", "object", "x0",    "y0",
+                                                 "theta0",  "x1",    "y1",     "theta1"};
+  return names;
+}
+
+enum TipColumn : std::size_t { kTipSession, kTipTrial, kTipTime, kTipX, kTipY };
+inline const std::vector<std::string>& tip_columns() {
+  static const std::vector<std::string> names = {"session", "trial", "t", "x", "y"};
+  return names;
+}
 
 using TrialKey = std::pair<std::string, std::int64_t>;
 
@@ -52,5 +96,18 @@ void add_paths(std::string_view text, const std::string& file, const std::vector
                Mistakes& mistakes);
 void add_tips(std::string_view text, const std::string& file, const std::vector<TrialLog*>& logs,
               Mistakes& mistakes);
+
+// Importer of bbautotune's forward-motion runs: lines
+//   x;y;theta;move(25.000000, 0.000000, 0.000000);x';y';theta'
+// in centimetres and radians, one file a run.
+
+// The text of one run as a session of that name; trials are numbered from 0, times, duties and
+// durations are unknown.  Blanks around fields and in place of the last semicolon are accepted.
+// Errors carry file:line:column; a move() other than (25, 0, 0) is one, since its meaning is not
+// known.  A last line that breaks off was cut short with its logger: it is omitted with a note.
+// Errors when `commands` has no "forward".
+Result<TrialLog> parse_bbautotune(std::string_view text, const std::string& file,
+                                  const std::string& session,
+                                  std::span<const std::string> commands);
 
 }  // namespace gapfarm

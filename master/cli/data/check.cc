@@ -10,7 +10,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "common/score/motion_model.h"
 #include "master/cli/data/idle_genes.h"
 #include "master/cli/subcommand.h"
@@ -20,9 +20,7 @@
 #include "master/evolve/optimisers.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/program_runs.h"
-#include "master/io/log_checks/finding.h"
 #include "master/io/log_checks/log_checks.h"
-#include "master/io/log_checks/sanity.h"
 #include "master/run/run.h"
 
 namespace gapfarm {

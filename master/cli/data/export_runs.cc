@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/json/json.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "master/cli/data/export_source.h"
 #include "master/ground/paths.h"
-#include "master/io/logs/mcap_writer.h"
+#include "master/io/logs/bags.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,7 @@
 #include "common/base/result.h"
 #include "common/config/settings.h"
 #include "master/farm/farm.h"
-#include "master/io/log_checks/finding.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 

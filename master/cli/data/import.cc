@@ -17,7 +17,7 @@
 #include "master/command/inputs.h"
 #include "master/command/outputs.h"
 #include "master/io/logs/bags.h"
-#include "master/io/logs/to_runs.h"
+#include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "master/cli/data/robot_setup.h"
 #include "master/cli/subcommand.h"
-#include "master/io/robot_files/robot_text.h"
+#include "master/io/robot_files/understand.h"
 
 namespace gapfarm {
 namespace {

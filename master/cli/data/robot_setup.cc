@@ -8,11 +8,9 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "common/trials/files.h"
-#include "master/io/robot_files/compare_facts.h"
 #include "master/io/robot_files/controllers.h"
-#include "master/io/robot_files/robot_text.h"
 
 namespace gapfarm {
 namespace {

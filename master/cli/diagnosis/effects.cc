@@ -14,7 +14,7 @@
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/farm/planned_trials.h"
-#include "master/report/figures/effect_figure.h"
+#include "master/report/figures/figures.h"
 
 namespace gapfarm {
 namespace {

@@ -2,8 +2,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/hash.h"
-#include "common/problem/run_files.h"
-#include "common/robot/robot_file.h"
+#include "common/problem/problem.h"
+#include "common/robot/robot.h"
 #include "master/cli/diagnosis/diagnose_command.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"

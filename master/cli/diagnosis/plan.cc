@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/text.h"
-#include "common/trials/select.h"
 #include "common/trials/text/csv.h"
+#include "common/trials/trial.h"
 #include "common/trials/write.h"
 #include "master/cli/diagnosis/plan_drive.h"
 #include "master/cli/subcommand.h"

@@ -12,12 +12,12 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/parameters/ground.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "common/svg/svg.h"
 #include "common/trials/text/csv.h"
 #include "master/command/inputs.h"
-#include "master/experiments/plan/drive_plan.h"
-#include "master/io/logs/to_runs.h"
+#include "master/experiments/plan/drive_knowledge.h"
+#include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/config/settings.h"
-#include "master/command/context.h"
+#include "master/command/console.h"
 #include "master/command/outputs.h"
 
 namespace gapfarm {

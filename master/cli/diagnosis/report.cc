@@ -3,14 +3,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/progress/number_text.h"
+#include "common/base/text.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/report_html.h"
 #include "master/report/run/run_report.h"
-#include "master/run/run_history.h"
 #include "master/run/run_page.h"
 
 namespace gapfarm {

@@ -10,15 +10,14 @@
 #include "common/base/build_info.h"
 #include "common/config/config.h"
 #include "common/json/fields.h"
-#include "common/problem/run_files.h"
-#include "common/score/constant_velocity.h"
+#include "common/problem/problem.h"
+#include "common/score/baselines.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
-#include "master/experiments/compare/summary.h"
 
 namespace gapfarm {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "master/command/context.h"
+#include "master/command/console.h"
 #include "master/farm/sites/fleet.h"
 
 namespace gapfarm {

@@ -11,7 +11,6 @@
 
 #include "common/base/ranges.h"
 #include "common/config/config.h"
-#include "common/config/stages.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/models/parameter_options.h"

@@ -17,7 +17,7 @@
 #include "master/cli/subcommand.h"
 #include "master/command/console.h"
 #include "master/command/long_command.h"
-#include "master/store/command_record.h"
+#include "master/store/records.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"

@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "common/config/config.h"
-#include "common/trials/select.h"
+#include "common/trials/trial.h"
 #include "master/cli/models/parameter_options.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"

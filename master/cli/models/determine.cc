@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/config/config.h"
-#include "common/trials/select.h"
+#include "common/trials/trial.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"

@@ -12,12 +12,10 @@
 
 #include "common/base/text.h"
 #include "common/trials/read.h"
-#include "common/trials/waypoint_log.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
-#include "master/experiments/drive/drive_report.h"
 
 namespace gapfarm {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"

@@ -12,7 +12,7 @@
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"
-#include "common/trials/select.h"
+#include "common/trials/trial.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"

@@ -5,7 +5,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/trials/read.h"
-#include "common/trials/select.h"
+#include "common/trials/trial.h"
 #include "common/trials/write.h"
 #include "master/cli/models/parameter_options.h"
 #include "master/cli/subcommand.h"

@@ -1,6 +1,4 @@
 // gapfarm stability CONFIG: where tiny changes of the start change the outcome least.
-#include "master/experiments/influence/stability.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <filesystem>
@@ -13,6 +11,7 @@
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
+#include "master/experiments/influence/influence.h"
 
 namespace gapfarm {
 namespace {

@@ -8,7 +8,7 @@
 #include "common/process/process_pool.h"
 #include "master/cli/evolution/fleet_options.h"
 #include "master/cli/subcommand.h"
-#include "master/store/command_record.h"
+#include "master/store/records.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_reader.h"
 

@@ -10,7 +10,7 @@
 #include "common/base/text.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
-#include "common/pose/extent.h"
+#include "common/pose/pose.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/proposals.h"

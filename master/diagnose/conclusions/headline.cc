@@ -5,7 +5,7 @@
 
 #include "common/base/ranges.h"
 #include "common/math/laws.h"
-#include "master/io/log_checks/finding.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/pose/segment.h"
+#include "common/pose/pose.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/fit/signatures.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/effects/start_turns.h"
+#include "common/effects/catalogue.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/fit/estimate.h"

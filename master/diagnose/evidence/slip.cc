@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "common/base/text.h"
-#include "common/pose/segment.h"
+#include "common/pose/pose.h"
 #include "common/score/density.h"
 #include "master/infer/climb.h"
 

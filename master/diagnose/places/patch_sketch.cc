@@ -6,7 +6,7 @@
 
 #include "common/base/constants.h"
 #include "common/math/statistics.h"
-#include "common/pose/extent.h"
+#include "common/pose/pose.h"
 #include "master/diagnose/fit/free_commands.h"
 
 namespace gapfarm {

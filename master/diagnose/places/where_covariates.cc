@@ -8,7 +8,7 @@
 
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
-#include "common/pose/extent.h"
+#include "common/pose/pose.h"
 
 namespace gapfarm {
 namespace {

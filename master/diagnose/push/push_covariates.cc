@@ -2,7 +2,7 @@
 #include <cmath>
 #include <functional>
 
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/push/push_subject.h"
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/pose/segment.h"
+#include "common/pose/pose.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/push/push_subject.h"

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "common/base/ranges.h"
-#include "common/pose/segment.h"
+#include "common/pose/pose.h"
 
 namespace gapfarm {
 namespace {

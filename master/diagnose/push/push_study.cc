@@ -6,7 +6,7 @@
 #include <span>
 
 #include "common/base/ranges.h"
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/slopes.h"

@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/push/push_geometry.h"
 

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "common/base/ranges.h"
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "common/score/fitness.h"
 #include "master/diagnose/places/where.h"
 #include "master/diagnose/push/push_subject.h"

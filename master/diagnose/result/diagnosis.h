@@ -12,7 +12,7 @@
 #include "common/residual/outliers.h"
 #include "common/trials/trial.h"
 #include "master/diagnose/result/parameter_row.h"
-#include "master/io/log_checks/finding.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 

@@ -5,7 +5,7 @@
 
 #include "common/json/json.h"
 #include "master/diagnose/result/json_fields.h"
-#include "master/io/log_checks/finding.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {

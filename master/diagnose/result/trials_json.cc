@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "common/base/text.h"
 #include "common/json/json.h"
-#include "common/math/digits.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
 

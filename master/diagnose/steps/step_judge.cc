@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/effects/catalogue.h"
-#include "common/math/digits.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/correction/fit.h"

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "common/base/ranges.h"
-#include "common/math/digits.h"
+#include "common/base/text.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/evidence/noise.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/math/digits.h"
+#include "common/base/text.h"
 #include "common/math/laws.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/signatures.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
-#include "common/math/digits.h"
+#include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"

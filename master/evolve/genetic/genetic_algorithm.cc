@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "master/evolve/genetic/breeder.h"
-#include "master/evolve/genetic/genetic.h"
+#include "master/evolve/optimisers.h"
 
 namespace gapfarm {
 namespace {

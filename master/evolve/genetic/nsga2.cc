@@ -7,8 +7,8 @@
 
 #include "common/base/ranges.h"
 #include "common/math/fronts.h"
-#include "master/evolve/genetic/genetic.h"
 #include "master/evolve/individual.h"
+#include "master/evolve/optimisers.h"
 
 namespace gapfarm {
 namespace {

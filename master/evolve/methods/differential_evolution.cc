@@ -1,7 +1,6 @@
 #include "master/evolve/methods/differential_evolution.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <numbers>

@@ -7,8 +7,6 @@
 #include "common/trials/files.h"
 #include "common/trials/write.h"
 #include "master/experiments/blind_check/cases/seal.h"
-#include "master/experiments/blind_check/folder.h"
-#include "master/experiments/blind_check/tally.h"
 
 namespace gapfarm {
 namespace {

@@ -1,5 +1,3 @@
-#include "master/experiments/blind_check/score.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +7,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "master/diagnose/effect_diagnosis.h"
+#include "master/experiments/blind_check/tally.h"
 
 namespace gapfarm {
 namespace {

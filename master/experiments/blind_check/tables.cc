@@ -1,5 +1,3 @@
-#include "master/experiments/blind_check/tables.h"
-
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -10,6 +8,7 @@
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/math/rank_tests.h"
+#include "master/experiments/blind_check/tally.h"
 
 namespace gapfarm {
 namespace {

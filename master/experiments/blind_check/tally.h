@@ -1,19 +1,115 @@
 // The blind check's result: every case scored, and what they add up to.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/config/settings.h"
+#include "common/process/stop.h"
 #include "common/residual/field.h"
+#include "master/diagnose/result/diagnosis.h"
 #include "master/experiments/blind_check/cases/design.h"
-#include "master/experiments/blind_check/children.h"
-#include "master/experiments/blind_check/score.h"
+#include "master/experiments/blind_check/cases/seal.h"
 #include "master/farm/farm.h"
 
 namespace gapfarm {
+
+// Runs jobs in child processes, a few at a time, each with a time limit.
+
+struct ChildJob {
+  std::string id;
+  std::vector<std::string> argv;  // argv[0]: path of the program
+  std::string log_path;           // its stdout and stderr
+};
+
+enum class ChildState { kDone, kFailed, kCrashed, kTimedOut };
+const char* child_state_name(ChildState state);  // "done", "failed", "crashed", "timeout"
+
+struct ChildEnd {
+  ChildState state = ChildState::kDone;
+  int status = 0;  // exit status, or the signal of a crash
+  double wall_s = 0;
+  std::string text;  // "exited with status 3"; empty when done
+  double cpu_s = 0;  // of the child and of its own children that it waited for
+};
+
+struct ChildrenOptions {
+  unsigned at_once = 1;
+  double time_limit_s = 1800;
+  StopSource* stop = nullptr;  // not owned
+  // Exit statuses that count as done.
+  std::function<bool(int status)> done = [](int status) { return status == 0; };
+  std::function<void(const ChildJob& job, const ChildEnd& end)> on_end;
+  std::function<void(std::size_t ended)> on_tick;  // now and then
+};
+
+// Runs all jobs in order; returns when the last has ended.  Every child leads a process group of
+// its own (a terminal's Ctrl-C does not reach it), inherits no descriptor, and dies with this
+// thread; a child beyond its limit is asked to end, then made to, with all its group. Errors:
+// kStopped, after the running children were ended (they are not reported); a program that
+// cannot be started.
+Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& options);
+
+// Is a diagnosis right?  The rules by which every case is judged.
+
+constexpr std::size_t kMaxAliases = 3;  // more say nothing
+
+struct Judgement {
+  bool right = false;
+  std::string why;  // "floor_nap; reported unknown"
+};
+
+// A null must be called `none`; what the catalogue does not hold `unknown`, or `effect+unknown`
+// naming nothing; a single effect must be the first named or one of its aliases; of a pair both
+// must be named; and nothing else may be.
+Judgement judge(const Truth& truth, const Diagnosis& diagnosis);
+
+// Whether an effect that is there was not named, and all such have every strength nearer to neutral
+// than the diagnosis says that its log shows; none: nothing was missed, or it says of none.
+std::optional<bool> missed_below(const Truth& truth, const Diagnosis& diagnosis);
+
+// The first named effect, or the verdict when none is named.
+std::string first_reported(const Diagnosis& diagnosis);
+
+// Whether the interval of one true parameter held it.
+struct Coverage {
+  std::string effect;
+  std::string key;
+  double truth = 0;
+  double lo = 0;  // NaN when the diagnosis gave no interval
+  double hi = 0;
+  bool covered = false;
+  bool is_strength = true;  // or a place, a direction, ... that means nothing without one
+  // Of the fit alone: whether its 90 % held it, and its width over the bound; none: no such
+  // interval.
+  std::optional<bool> covered_by_fit = {};
+  std::optional<double> fit_over_bound = {};
+};
+
+// One entry a parameter of every true effect that was named by its own name: an alias has other
+// parameters.  Angles are compared on the circle.  Omitted: choices (they have no interval) and
+// what means nothing since the effect's strengths are neutral.
+std::vector<Coverage> coverage_of(const Truth& truth, const Diagnosis& diagnosis);
+
+// The share of the explainable gap that the diagnosis promises its effects close: the sum of
+// `closed`, NaN when an effect has none.  0 without effects.
+double promised_shrinkage(const Diagnosis& diagnosis);
+
+struct Rate {
+  unsigned hits = 0;
+  unsigned total = 0;
+
+  void add(bool hit) {
+    hits += hit;
+    ++total;
+  }
+  double share() const { return total ? static_cast<double>(hits) / total : 0; }
+};
 
 // Mean log score of a fresh log (nats a trial) under three models.
 struct FreshScores {
@@ -95,5 +191,23 @@ std::optional<DiagnosedCase> read_diagnosed_case(const Truth& truth, const std::
 Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     const Config& config, const std::vector<DiagnosedCase>& cases, const SessionPlans& plan,
     Farm& farm, const DesignProgress& progress = {});
+
+// The blind check's result for people and for programs.
+
+struct BlindReport {
+  std::vector<std::pair<std::string, std::string>> provenance;  // label and value
+  std::vector<ScoredCase> cases;
+  std::vector<OutOfReach> out_of_reach;
+};
+
+// blind_check.json: provenance, rates with 95 % Wilson intervals, confusion matrix, cases.
+std::string format_blind_json(const BlindReport& report);
+// blind_check.md: the same as tables.
+std::string format_blind_markdown(const BlindReport& report);
+// The rates alone, for a terminal.
+std::string format_blind_summary(const BlindReport& report);
+
+// What would be made: every effect with its drawn parameters and size, and what is out of reach.
+std::string format_design(const BlindDesign& design, const ParameterTable& table);
 
 }  // namespace gapfarm

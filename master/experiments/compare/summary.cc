@@ -1,5 +1,3 @@
-#include "master/experiments/compare/summary.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -8,7 +6,8 @@
 
 #include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
-#include "master/report/figures/line_chart.h"
+#include "master/experiments/compare/compare.h"
+#include "master/report/figures/figures.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 

@@ -8,7 +8,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
-#include "common/trials/select.h"
+#include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "common/progress/overall_progress.h"

@@ -1,5 +1,3 @@
-#include "master/experiments/drive/drive_report.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -9,7 +7,8 @@
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
-#include "master/report/figures/line_chart.h"
+#include "master/experiments/drive/drive.h"
+#include "master/report/figures/figures.h"
 #include "master/report/page_frame.h"
 
 namespace gapfarm {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/ranges.h"
 #include "common/math/rank_tests.h"
 #include "common/random/stream.h"
 

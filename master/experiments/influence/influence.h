@@ -13,10 +13,69 @@
 // standard are still close to one another.
 #pragma once
 
-#include "common/base/interval.h"
-#include "master/experiments/influence/paths.h"
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/ranges.h"
+#include "common/base/result.h"
+#include "common/config/settings.h"
+#include "common/math/path_distance.h"
+#include "common/problem/problem.h"
+#include "common/progress/overall_progress.h"
+#include "master/farm/farm.h"
 
 namespace gapfarm {
+
+// Traced paths of a scenario's commands at given parameter values, as points to compare.
+
+// One path a command, or one a corner of the piece in each trial, sampled from t = 0 at equal
+// intervals; z is the height.
+struct PathSet {
+  bool ok = true;  // false: a simulation did not end well, the paths are not to be used
+  std::vector<std::vector<PathPoint>> paths;
+};
+
+struct TraceSettings {
+  std::vector<CommandSpec> commands;
+  // Where commands are pieces, the pushes to trace, by index into the problem's trials.
+  std::vector<std::uint32_t> trials;
+  double interval_s = 0.02;
+  std::uint64_t seed = 1;
+};
+
+// A set of traces to make: values that replace the problem's, and whose noise.
+struct TraceRequest {
+  std::vector<v1::Override> overrides;
+  std::optional<std::uint64_t> repeat;  // names the noise; none: the nominal motion
+};
+
+std::vector<v1::Override> overrides_of(const ParameterTable& table, const std::vector<Gene>& genes,
+                                       const Genome& genome);
+
+// Tasks that trace_paths() asks for each request.
+std::size_t traces_of_a_set(const Problem& problem, const TraceSettings& settings);
+
+// Errors: of the farm, and a refused task (which names what is wrong with it).
+Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
+                                         const TraceSettings& settings,
+                                         std::span<const TraceRequest> requests);
+
+using PathDistance = double (*)(std::span<const PathPoint>, std::span<const PathPoint>);
+
+// Rows of a table: lettier, hausdorff, frechet.
+struct PathDistanceRow {
+  const char* name;
+  PathDistance distance;
+};
+std::span<const PathDistanceRow> path_distances();
+
+// Mean over the commands, of the first `samples` points of each path.  REQUIRES: both ok.
+double set_distance(const PathSet& a, const PathSet& b, PathDistance distance, std::size_t samples);
+
+// Greatest extent in x, y or z of any path of the set, over its first `samples` points.
+double set_extent(const PathSet& set, std::size_t samples);
 
 struct InfluenceSettings {
   TraceSettings trace;
@@ -87,5 +146,39 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
 
 // The section [genes] of a config that searches the influential ones (by either method).
 std::string influential_genes(const InfluenceReport& report, const ParameterTable& table);
+
+// Search for the parameters at which tiny changes of the start change the outcome least (Weitnauer,
+// Haschke and Ritter 2010, sec. 3.2): a simulation that forks at a hair's breadth cannot be tuned.
+
+struct StabilitySettings {
+  TraceSettings trace;
+  unsigned repeats = 16;
+  std::uint64_t evaluations = 300;
+  EvolutionSettings evolution;  // which optimiser, and how
+};
+
+// How far the ends of repeats scatter: root of the mean squared distance from their mean, m, over
+// the commands; none when one of them did not end well.
+std::optional<double> end_spread(std::span<const PathSet> repeats);
+
+struct StablePoint {
+  ParameterValues values;
+  double spread = 0;  // m
+};
+
+struct StabilityReport {
+  std::optional<double> standard_spread;  // at the config's own values
+  StablePoint best;
+  // The same two on repeats that the search did not see.
+  std::optional<double> standard_fresh, best_fresh;
+  std::vector<StablePoint> tried;  // that ended well, in order
+  std::uint64_t evaluations = 0;
+};
+
+// Over the problem's genes.  The repeats' noise is the same at every point, so the search itself is
+// not noisy.  Errors: no genes, of the tracing, no point that ends well.
+Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
+                                       const StabilitySettings& settings,
+                                       const StageHooks& hooks = {});
 
 }  // namespace gapfarm

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "master/experiments/influence/influence.h"
-#include "master/report/figures/line_chart.h"
+#include "master/report/figures/figures.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 

@@ -7,7 +7,6 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "master/diagnose/subject.h"
-#include "master/experiments/plan/visibility.h"
 #include "master/farm/planned_trials.h"
 
 namespace gapfarm::plan {

@@ -1,5 +1,3 @@
-#include "master/experiments/plan/drive_plan.h"
-
 #include <algorithm>
 #include <cmath>
 #include <string>

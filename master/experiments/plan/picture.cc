@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/pose/extent.h"
+#include "common/pose/pose.h"
 #include "common/svg/svg.h"
 #include "master/experiments/plan/design.h"
-#include "master/report/figures/line_chart.h"
+#include "master/report/figures/figures.h"
 
 namespace gapfarm::plan {
 namespace {

@@ -11,8 +11,8 @@
 #include "common/process/child.h"
 #include "common/process/stop.h"
 #include "gapfarm/v1/farm.pb.h"
+#include "master/farm/farm.h"
 #include "master/farm/sites/autoscaler.h"
-#include "master/farm/sites/fleet_status.h"
 #include "master/farm/sites/site.h"
 
 namespace gapfarm {

@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "master/diagnose/result/diagnosis.h"
 #include "master/ground/fit/window_fit.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/base/ranges.h"
-#include "common/score/kinematic_start.h"
+#include "common/score/kinematic.h"
 #include "master/ground/fit/scans.h"
 #include "master/ground/fit/stretches.h"
 #include "master/ground/fit/window_fit.h"

@@ -9,7 +9,7 @@
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
-#include "common/score/kinematic_start.h"
+#include "common/score/kinematic.h"
 #include "master/ground/fit/kinematic_baseline.h"
 #include "master/ground/fit/stretches.h"
 #include "master/infer/compete.h"

@@ -10,7 +10,7 @@
 
 #include "common/base/hash.h"
 #include "common/robot/robot.h"
-#include "common/score/kinematic_paths.h"
+#include "common/score/kinematic_body.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/hypotheses.h"
 

@@ -6,7 +6,7 @@
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/tolerances.h"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <optional>
 
-#include "common/recordings/increment_noise.h"
+#include "common/recordings/run.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

@@ -9,7 +9,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/json/fields.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "common/score/kinematic.h"
 #include "master/ground/tolerances.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/interval.h"
+#include "common/base/ranges.h"
 #include "common/base/result.h"
 #include "common/robot/robot.h"
 

@@ -10,7 +10,7 @@
 #include "common/json/fields.h"
 #include "common/math/laws.h"
 #include "master/ground/watch/mixed_model.h"
-#include "master/report/figures/line_chart.h"
+#include "master/report/figures/figures.h"
 #include "master/report/page_frame.h"
 
 namespace gapfarm {

@@ -1,5 +1,3 @@
-#include "master/io/log_checks/drive_checks.h"
-
 #include <algorithm>
 #include <cmath>
 #include <complex>

@@ -2,15 +2,53 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
+#include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/base/ranges.h"
+#include "common/pose/pose.h"
 #include "common/problem/problem.h"
+#include "common/recordings/run.h"
 #include "common/trials/trial.h"
-#include "master/io/log_checks/finding.h"
 
 namespace gapfarm {
+
+// What is wrong with a log or with its fit to a config, as a person would question it.
+
+enum class Severity {
+  kNote,      // worth knowing; a diagnosis goes on
+  kWarning,   // nothing is named because of it
+  kUnusable,  // whatever a diagnosis reported would be about this and not about the robot
+};
+
+struct SanityFinding {
+  std::string name;    // "unit_error", "axes_swapped", ...: docs/diagnosis.md lists them
+  std::string text;    // the evidence, one or two sentences with figures
+  std::string remedy;  // what to do, one sentence
+  Severity severity = Severity::kUnusable;
+  // Effects of the catalogue's kind: what a file or log has the wrong way round, rather than what
+  // it lacks.  Those that would explain the evidence as well stand in `or_else`.
+  bool names_an_effect = false;
+  std::vector<std::string> or_else = {};
+};
+
+// Of logs of drives and of pushes alike.
+inline constexpr const char* kEndsSwapped = "ends_swapped";
+inline constexpr const char* kExchangeEnds = "Exchange x0 and x1, y0 and y1, theta0 and theta1.";
+
+inline bool any_unusable(const std::vector<SanityFinding>& findings) {
+  return contains(findings, Severity::kUnusable, &SanityFinding::severity);
+}
+
+// "left and right are exchanged": what a finding means, for a headline.
+std::string finding_phrase(const SanityFinding& finding);
+
+// "unusable", "doubt", "note".
+const char* severity_name(Severity severity);
 
 void check_count(const TrialLog& log, std::vector<SanityFinding>* findings);
 // Rows that repeat another one's poses, far below any noise, although something moved.
@@ -71,5 +109,117 @@ TipJumps check_tip_jumps(const TrialLog& log);
 
 // Nothing moved; or finger and pieces are not in one frame and unit, or not of the same pushes.
 void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings);
+
+// What a careful person would check before simulating anything: units, axes, clocks, copies, too
+// little of everything, a robot that the scenario cannot be.
+
+// The worst first.  A pure function of log and config that takes milliseconds; robust against a few
+// per cent of wild rows.  `impossible`: set to the trials that cannot be, ascending: drives for
+// which the robot would have had to move at more than twice the log's own speed and 30 cm beyond
+// (none where they are so many that the speed itself is in question), and trials that other
+// readings contradict (false_readings()), and pushes whose finger jumps (check_tip_jumps()).
+std::vector<SanityFinding> check_sanity(const Problem& problem,
+                                        std::vector<std::size_t>* impossible = nullptr);
+
+// What is wrong with logged runs of any ground robot.
+
+struct RunChecks {
+  std::vector<SanityFinding> findings;
+  // Which say nothing of how commands move a robot, or what another has said: ascending.
+  std::vector<std::size_t> useless;
+  std::set<std::pair<std::size_t, std::size_t>> false_poses = {};  // of which run, which
+  bool gyro_is_wrong = false;                                      // it contradicts the headings
+
+  bool none_is_left(const RunLog& log) const {
+    return !useless.empty() && useless.size() == log.runs.size();
+  }
+};
+
+// Runs whose poses never change, or crawl, though the robot is commanded to drive, that move though
+// nothing is commanded, and that are another one's copy; stretches without any pose; commands that
+// are older than the robot's timeout; a gyro of another sign, unit or clock than the headings.
+RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s = {});
+
+// Poses that the tracker took from elsewhere, for they jump there and back.  REQUIRES: headings in
+// radians.
+RunChecks check_jumps(const RunLog& log);
+
+// Without what these found.
+RunLog without(RunLog log, const RunChecks& checks);
+
+// Checks of logs of drives.
+
+struct DriveSample {
+  std::size_t trial = 0;  // of the log
+  double forward_s = 0;   // mean of both sides' duties times the duration: + is ahead
+  double turn_s = 0;      // right less left duty times the duration: + is counter-clockwise
+  double most_s = 0;      // the greater duty's size times the duration
+  Pose X_WS, X_WE;
+
+  double distance_m() const;
+  double turned_rad() const;       // wrapped
+  double mid_heading_rad() const;  // half way through the turn
+  double travel_rad() const;       // of the way from start to end, in the world
+};
+
+// One a trial of a log of drives.
+std::vector<DriveSample> drive_samples(const Problem& problem);
+
+// Metres (or whatever the log has) a second at full duty: the median of straight drives, else of
+// gentle arcs; 0 where there are none.
+double full_speed_of(const std::vector<DriveSample>& samples);
+
+// Fewer straight drives say nothing.
+inline constexpr std::size_t kFewestStraight = 8;
+
+// Those that drive straight enough to follow their heading: straight ones where there are enough,
+// else gentle arcs.
+std::vector<DriveSample> straight_samples(const std::vector<DriveSample>& samples);
+
+// What a scenario's robot can do, of its parameters' bounds and the config's values.
+struct DriveLimits {
+  double slowest_m_s = 0, fastest_m_s = 0;  // full speed at full duty
+  double expected_m_s = 0;                  // the config's
+  double gauge_m = 0;                       // between left and right contact
+};
+
+// Nothing was commanded to move, or nothing did.  Whether anything was found.
+bool check_motion(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+                  std::vector<SanityFinding>* findings);
+// Lengths of another unit, or a robot that is faster or slower than the scenario's can be.
+bool check_speed(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+                 std::vector<SanityFinding>* findings);
+// Headings of another unit: small ones while the travel goes all ways.
+bool check_heading_unit(const std::vector<DriveSample>& samples,
+                        std::vector<SanityFinding>* findings);
+// Straight drives that go any way: commands of other trials, or poses of another robot.
+bool check_related(const std::vector<DriveSample>& samples, std::vector<SanityFinding>* findings);
+// Turns faster than the sides' speeds and their distance allow without any slip.
+void check_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+                   std::vector<SanityFinding>* findings);
+
+// Whether positions, headings and commands have the same sense: mirrored and swapped axes, headings
+// that count clockwise, sides reported the wrong way round.
+
+// How the direction of travel follows the heading, over drives that go straight: travel = heading +
+// offset where positions and headings have the same sense, travel = -heading + offset where one of
+// them is mirrored.
+struct TravelFit {
+  double same = 0;      // concentration in [0, 1] of travel - heading
+  double mirrored = 0;  // of travel + heading
+  double offset_rad = 0;
+  std::size_t drives = 0;
+
+  bool is_clear() const;  // one of them is clearly the better one, and good
+};
+TravelFit fit_travel(const std::vector<DriveSample>& samples);
+
+// Which way headings change when the right side is commanded to run faster: +1 counter-clockwise,
+// as it should be, -1 clockwise; 0 where the log does not say, so also where turns by 200 degrees
+// one way cannot be distinguished from 160 the other.
+int sense_of_turns(const std::vector<DriveSample>& samples);
+
+// The one thing that is the wrong way round, named by Occam: none where all agree or nothing says.
+std::optional<SanityFinding> check_axes(const std::vector<DriveSample>& samples);
 
 }  // namespace gapfarm

@@ -5,9 +5,8 @@
 #include <utility>
 
 #include "common/math/statistics.h"
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "master/io/log_checks/log_checks.h"
-#include "master/io/log_checks/run_checks.h"
 
 namespace gapfarm {
 namespace {

@@ -1,5 +1,3 @@
-#include "master/io/log_checks/sanity.h"
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -10,7 +8,6 @@
 
 #include "common/base/ranges.h"
 #include "common/trials/context.h"
-#include "master/io/log_checks/drive_checks.h"
 #include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {

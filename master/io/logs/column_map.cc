@@ -12,7 +12,6 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/config/toml_section.h"
-#include "common/recordings/increment_noise.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/io/logs/log_table.h"
+#include "common/recordings/run.h"
+#include "master/io/logs/bags.h"
 
 namespace gapfarm {
 
@@ -37,7 +38,7 @@ struct TableMap {
   std::vector<MappedColumn> columns;
 
   const MappedColumn* find(std::string_view role) const;
-  // The roles of an increment's noise (common/recordings/increment_noise.h); empty: it has none.
+  // The roles of an increment's noise (common/recordings/run.h); empty: it has none.
   std::span<const std::string> noise() const;
 };
 
@@ -97,5 +98,25 @@ bool are_durations(const std::vector<double>& times, double second);
 
 // Whether a column, of 50 rows or more, steps by more than half of its range.
 bool seems_to_wrap(const LogTable& table, std::size_t column);
+
+// Recordings and a map to the one format of runs (docs/formats.md).
+
+struct ImportedRuns {
+  RunLog log;
+  double clock_start_s = 0;         // what was taken off every time of the recordings
+  std::vector<std::string> report;  // what was taken and what was left, a sentence each
+};
+
+// Times in s from the first one, poses in m and rad about the world's upward axis, commands in SI.
+// Rows without a number where one is needed, poses whose quaternion is none and times that go back
+// are omitted and counted.  Errors: no rows of poses or commands where the map has them, a column
+// that is not there, a clock that was set back, rims' speeds in m/s without a wheel radius.
+Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map);
+
+// commands.csv, poses.csv, wheels.csv and gyro.csv (empty: there are none).
+struct RunFiles {
+  std::string commands, poses, wheels, gyro;
+};
+RunFiles format_runs(const RunLog& log);
 
 }  // namespace gapfarm

@@ -6,7 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/math/statistics.h"
-#include "common/recordings/increment_noise.h"
+#include "common/recordings/run.h"
 #include "master/io/logs/column_map.h"
 #include "master/io/logs/topics.h"
 

@@ -1,9 +1,9 @@
-#include "master/io/logs/mcap_writer.h"
-
 #include <algorithm>
 #include <cassert>
 #include <limits>
 #include <map>
+
+#include "master/io/logs/bags.h"
 
 namespace gapfarm {
 namespace {

@@ -1,13 +1,11 @@
-#include "master/io/logs/message.h"
-
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <set>
 
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
+#include "master/io/logs/topics.h"
 
 namespace gapfarm {
 namespace {

@@ -10,7 +10,7 @@
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/text/mistakes.h"
-#include "master/io/logs/log_table.h"
+#include "master/io/logs/bags.h"
 
 namespace gapfarm {
 namespace {

@@ -1,5 +1,3 @@
-#include "master/io/logs/to_runs.h"
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -10,8 +8,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/recordings/increment_noise.h"
-#include "common/recordings/read.h"
+#include "common/recordings/run.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
 

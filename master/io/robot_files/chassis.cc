@@ -1,11 +1,10 @@
-#include "master/io/robot_files/chassis.h"
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
+#include "master/io/robot_files/understand.h"
 #include "master/io/robot_files/urdf/urdf.h"
 
 namespace gapfarm {

@@ -1,10 +1,9 @@
-#include "master/io/robot_files/compare_facts.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
+#include "master/io/robot_files/understand.h"
 
 namespace gapfarm {
 namespace {

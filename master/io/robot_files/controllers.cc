@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"

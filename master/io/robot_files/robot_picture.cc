@@ -4,7 +4,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/svg/svg.h"
-#include "master/io/robot_files/robot_text.h"
+#include "master/io/robot_files/understand.h"
 
 namespace gapfarm {
 namespace {

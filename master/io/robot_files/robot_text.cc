@@ -1,5 +1,3 @@
-#include "master/io/robot_files/robot_text.h"
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -10,7 +8,7 @@
 #include "common/base/text.h"
 #include "common/json/json.h"
 #include "common/parameters/ground.h"
-#include "master/io/robot_files/compare_facts.h"
+#include "master/io/robot_files/understand.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,6 @@
 #include <set>
 
 #include "common/trials/text/csv.h"
-#include "master/io/robot_files/compare_facts.h"
 #include "master/io/robot_files/urdf/urdf.h"
 
 namespace gapfarm {

@@ -1,5 +1,3 @@
-#include "master/report/figures/effect_figure.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -9,8 +7,9 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/pose/extent.h"
+#include "common/pose/pose.h"
 #include "common/svg/svg.h"
+#include "master/report/figures/figures.h"
 #include "master/report/html.h"
 
 namespace gapfarm {

@@ -1,8 +1,8 @@
-#include "master/report/figures/line_chart.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "master/report/figures/figures.h"
 
 namespace gapfarm {
 namespace {

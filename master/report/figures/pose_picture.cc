@@ -1,5 +1,3 @@
-#include "master/report/figures/pose_picture.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -10,9 +8,10 @@
 
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
-#include "common/pose/extent.h"
+#include "common/pose/pose.h"
 #include "common/score/motion_model.h"
 #include "common/svg/svg.h"
+#include "master/report/figures/figures.h"
 #include "master/report/prediction_table.h"
 
 namespace gapfarm {

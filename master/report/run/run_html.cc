@@ -5,16 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/json/json.h"
-#include "common/math/digits.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/diagnose/result/json_fields.h"
-#include "master/report/figures/line_chart.h"
-#include "master/report/glossary.h"
+#include "master/report/figures/figures.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/report/report_sections.h"
-#include "master/report/run/run_live.h"
+#include "master/report/report_html.h"
 #include "master/report/run/run_report.h"
 
 namespace gapfarm {

@@ -1,5 +1,3 @@
-#include "master/report/run/run_live.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -7,10 +5,9 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/math/digits.h"
-#include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
+#include "master/report/run/run_report.h"
 
 namespace gapfarm {
 namespace {

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 #include "master/diagnose/result/diagnosis.h"
+#include "master/report/html.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -191,5 +193,32 @@ std::string run_html(const RunReport& report);
 // Fitness by generation, as SVG: best over the band from best to worst, and median.  The scale
 // follows the best and the bulk of the medians; what is worse is cut off at the frame.
 std::string fitness_chart(const RunReport& report);
+
+// What a run's page says of how it went on: operators, populations, genomes, the farm.
+
+// For plots: numbers with no more digits than these can show; null where there is none.
+Json written(const std::optional<double>& value, int digits = kPlotDigits);
+Json written(const std::vector<double>& values, int digits = kPlotDigits);
+Json written_values(const std::vector<NamedValue>& values, int digits);
+
+// "running, 38.1 evaluations/s, about 3 min left", in a line of its own.
+std::string state_line(const RunFarm& farm);
+std::string operators_section(const RunReport& report);
+std::string densities_section(const RunReport& report);
+std::string elite_section(const RunReport& report);
+std::string front_section(const RunReport& report);
+// Importance of the genes, and the fitness over two of them.
+std::string understanding_section(const RunReport& report);
+std::string genomes_section(const RunReport& report);
+std::string farm_section(const RunFarm& farm);
+
+// At most 2,000.
+Json generations_json(const RunReport& report);
+Json operators_json(const RunReport& report);
+Json densities_json(const RunReport& report);
+Json elite_json(const RunReport& report);
+Json front_json(const RunReport& report);
+Json sample_json(const RunReport& report);
+Json timeline_json(const RunFarm& farm);
 
 }  // namespace gapfarm

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/pose/segment.h"
 #include "common/random/stream.h"
 
 namespace gapfarm::pose_test {

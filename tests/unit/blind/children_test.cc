@@ -1,11 +1,10 @@
-#include "master/experiments/blind_check/children.h"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <map>
 
 #include "common/trials/files.h"
+#include "master/experiments/blind_check/tally.h"
 #include "master/farm/farm.h"
 #include "tests/unit/blind/worker_farm.h"
 

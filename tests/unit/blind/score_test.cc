@@ -1,5 +1,3 @@
-#include "master/experiments/blind_check/score.h"
-
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
@@ -9,7 +7,8 @@
 
 #include "common/trials/files.h"
 #include "master/diagnose/result/diagnosis_json.h"
-#include "master/experiments/blind_check/folder.h"
+#include "master/experiments/blind_check/blind_check.h"
+#include "master/experiments/blind_check/tally.h"
 #include "tests/unit/blind/worker_farm.h"
 
 namespace gapfarm::score_test {

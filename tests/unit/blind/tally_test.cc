@@ -5,8 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "master/experiments/blind_check/tables.h"
-
 namespace gapfarm::tally_test {
 
 using ::testing::HasSubstr;

@@ -7,8 +7,7 @@
 #include <set>
 
 #include "common/usage/usage.h"
-#include "master/cli/app.h"
-#include "master/cli/completion_candidates.h"
+#include "master/cli/subcommand.h"
 
 namespace gapfarm::completion_test {
 

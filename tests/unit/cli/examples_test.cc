@@ -5,7 +5,7 @@
 #include <set>
 #include <sstream>
 
-#include "master/cli/app.h"
+#include "master/cli/subcommand.h"
 
 namespace gapfarm::examples_test {
 

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "common/base/text.h"
-#include "master/cli/app.h"
+#include "master/cli/subcommand.h"
 
 namespace gapfarm::usage_test {
 

@@ -10,7 +10,6 @@
 #include "common/config/config.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
-#include "master/experiments/compare/summary.h"
 #include "tests/temporary_folder.h"
 
 namespace gapfarm::compare_test {

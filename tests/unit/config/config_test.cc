@@ -5,7 +5,6 @@
 
 #include <filesystem>
 
-#include "common/config/stages.h"
 #include "common/trials/files.h"
 
 namespace gapfarm::config_test {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "master/diagnose/push/push_geometry.h"
 #include "master/diagnose/push/push_subject.h"
 #include "tests/unit/diagnose/drawn_pushes.h"

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/ranges.h"
-#include "common/math/digits.h"
+#include "common/base/text.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "master/experiments/drive/drive_report.h"
+#include "master/experiments/drive/drive.h"
 
 namespace gapfarm::band_test {
 

@@ -6,8 +6,7 @@
 #include <cmath>
 
 #include "common/config/config.h"
-#include "common/trials/waypoint_log.h"
-#include "master/experiments/drive/drive_report.h"
+#include "common/trials/read.h"
 #include "tests/unit/blind/worker_farm.h"
 
 namespace gapfarm::drive_drive_test {

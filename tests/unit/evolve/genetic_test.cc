@@ -1,5 +1,3 @@
-#include "master/evolve/genetic/genetic.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 
 #include "common/random/stream.h"
 #include "master/evolve/evolve.h"
+#include "master/evolve/optimisers.h"
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
 

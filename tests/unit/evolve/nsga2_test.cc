@@ -5,7 +5,7 @@
 #include <set>
 
 #include "common/random/stream.h"
-#include "master/evolve/genetic/genetic.h"
+#include "master/evolve/optimisers.h"
 #include "tests/unit/evolve/front_functions.h"
 #include "tests/unit/evolve/members_digest.h"
 

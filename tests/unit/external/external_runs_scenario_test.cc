@@ -6,7 +6,7 @@
 
 #include "common/config/config.h"
 #include "common/external/simulator.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "worker/evaluate.h"
 
 namespace gapfarm::external_runs_scenario_test {

@@ -17,7 +17,7 @@
 #include "common/net/envelope.h"
 #include "master/farm/farm.h"
 #include "master/farm/socket_farm.h"
-#include "worker/pump.h"
+#include "worker/session.h"
 
 namespace gapfarm {
 

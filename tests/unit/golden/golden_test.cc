@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "common/base/hash.h"
-#include "common/parameters/racquetball.h"
+#include "common/parameters/table.h"
 #include "tests/unit/worker/ground_problem.h"
 #include "tests/unit/worker/problems.h"
 #include "tests/unit/worker/push_problem.h"

@@ -11,7 +11,7 @@
 
 #include "common/random/stream.h"
 #include "common/recordings/run.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "common/score/kinematic.h"
 
 namespace gapfarm {

@@ -8,13 +8,13 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "common/robot/robot_file.h"
-#include "common/score/omni_inverse.h"
+#include "common/robot/robot.h"
+#include "common/score/kinematic_body.h"
 #include "common/trials/files.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/wheel_loop.h"
 #include "master/io/logs/bags.h"
-#include "master/io/logs/to_runs.h"
+#include "master/io/logs/column_map.h"
 #include "tests/unit/trials/shared_data.h"
 
 namespace gapfarm {

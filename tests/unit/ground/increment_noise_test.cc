@@ -1,10 +1,8 @@
 // What a log states about its increments, and what it has beside them: covariances, a gyro,
 // returns.
-#include "common/recordings/increment_noise.h"
-
 #include <fstream>
 
-#include "common/recordings/read.h"
+#include "common/recordings/run.h"
 #include "tests/unit/ground/scan_matched.h"
 
 namespace gapfarm::increment_noise_test {

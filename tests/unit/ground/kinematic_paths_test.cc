@@ -1,9 +1,8 @@
-#include "common/score/kinematic_paths.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "common/score/kinematic_body.h"
 #include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {

@@ -1,5 +1,3 @@
-#include "common/score/kinematic_start.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -7,9 +7,9 @@
 #include <set>
 
 #include "common/base/ranges.h"
-#include "common/recordings/read.h"
+#include "common/recordings/run.h"
 #include "master/ground/diagnose_ground.h"
-#include "master/io/logs/to_runs.h"
+#include "master/io/logs/column_map.h"
 #include "tests/unit/ground/scan_matched.h"
 
 namespace gapfarm::relative_poses_test {

@@ -11,7 +11,7 @@
 
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "master/ground/reference.h"
 
 namespace gapfarm::scan_matched {

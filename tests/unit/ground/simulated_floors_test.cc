@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/random/stream.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "master/ground/diagnose_ground.h"
 #include "worker/sim/robot/ground.h"
 

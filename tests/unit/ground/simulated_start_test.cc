@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "common/parameters/table.h"
-#include "common/score/kinematic_start.h"
+#include "common/score/kinematic.h"
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/worker/ground_problem.h"
 

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "common/random/stream.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "master/ground/fit/fit_file.h"
 #include "master/ground/watch/changes.h"
 #include "tests/unit/ground/driven_log.h"

@@ -9,8 +9,8 @@
 #include <functional>
 #include <sstream>
 
-#include "common/problem/run_files.h"
-#include "common/robot/robot_file.h"
+#include "common/problem/problem.h"
+#include "common/robot/robot.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/tolerances.h"
 #include "tests/unit/ground/driven_log.h"

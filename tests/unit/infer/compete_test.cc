@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "common/random/stream.h"
 #include "master/infer/certificate.h"
 

@@ -4,8 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/config/config.h"
-#include "common/parameters/racquetball.h"
-#include "master/experiments/influence/stability.h"
+#include "common/parameters/table.h"
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/worker/push_problem.h"
 

@@ -11,9 +11,7 @@
 #include <numbers>
 
 #include "common/trials/files.h"
-#include "master/io/logs/mcap_writer.h"
-#include "master/io/logs/message.h"
-#include "master/io/logs/to_runs.h"
+#include "master/io/logs/column_map.h"
 #include "master/io/logs/topics.h"
 #include "tests/fuzz/memory_source.h"
 

@@ -1,10 +1,10 @@
 // Files of McapWriter by the format's own words (https://mcap.dev/spec), read by a walk of its own.
-#include "master/io/logs/mcap_writer.h"
-
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <map>
+
+#include "master/io/logs/bags.h"
 
 namespace gapfarm::mcap_writer_test {
 namespace {

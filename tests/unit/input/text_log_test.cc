@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <numbers>
 
-#include "common/recordings/read.h"
+#include "common/recordings/run.h"
 #include "common/trials/files.h"
 #include "master/io/logs/bags.h"
-#include "master/io/logs/to_runs.h"
+#include "master/io/logs/column_map.h"
 
 namespace gapfarm::text_log_test {
 

@@ -1,12 +1,11 @@
 // Drives of a ground robot that show its values, and how sure they make of them.
-#include "master/experiments/plan/drive_plan.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "common/random/stream.h"
+#include "master/experiments/plan/drive_knowledge.h"
 #include "master/ground/fit/window_fit.h"
 #include "tests/unit/ground/driven_log.h"
 

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "common/progress/number_text.h"
+#include "common/base/text.h"
 
 namespace gapfarm::overall_progress_test {
 

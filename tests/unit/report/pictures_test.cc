@@ -11,8 +11,7 @@
 #include <sstream>
 
 #include "common/random/stream.h"
-#include "master/report/figures/line_chart.h"
-#include "master/report/figures/pose_picture.h"
+#include "master/report/figures/figures.h"
 #include "master/report/run/run_report.h"
 
 namespace gapfarm::pictures_test {

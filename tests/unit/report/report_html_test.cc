@@ -9,7 +9,6 @@
 #include "common/config/config.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/report/report_sections.h"
 #include "master/report/run/run_report.h"
 #include "tests/unit/report/example_diagnosis.h"
 

@@ -1,11 +1,10 @@
 // robot.toml: read, written, and refused with the place of what is wrong.
-#include "common/robot/robot_file.h"
-
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "common/recordings/read.h"
+#include "common/recordings/run.h"
+#include "common/robot/robot.h"
 #include "common/trials/files.h"
 
 namespace gapfarm::robot_file_test {

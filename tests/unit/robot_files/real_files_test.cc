@@ -7,7 +7,7 @@
 #include <map>
 
 #include "common/trials/files.h"
-#include "master/io/robot_files/robot_text.h"
+#include "master/io/robot_files/understand.h"
 
 namespace gapfarm::real_files_test {
 

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "master/io/robot_files/controllers.h"
-#include "master/io/robot_files/robot_text.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
 namespace gapfarm::understand_test {

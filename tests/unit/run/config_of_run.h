@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/config/config.h"
-#include "common/problem/run_files.h"
+#include "common/problem/problem.h"
 #include "common/trials/read.h"
 
 namespace gapfarm::tests {

@@ -1,7 +1,7 @@
 // Who worked when, from what the store shows.
 #include <gmock/gmock.h>
 
-#include "master/run/run_history.h"
+#include "master/run/run_page.h"
 
 namespace gapfarm::run_farm_history_test {
 

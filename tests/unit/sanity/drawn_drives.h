@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/random/stream.h"
-#include "master/io/log_checks/sanity.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm::sanity_test {
 

@@ -6,10 +6,9 @@
 #include <functional>
 #include <numbers>
 
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "common/random/stream.h"
 #include "master/io/log_checks/log_checks.h"
-#include "master/io/log_checks/sanity.h"
 
 namespace gapfarm::push_checks_test {
 

@@ -1,5 +1,3 @@
-#include "master/io/log_checks/run_checks.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,6 +11,7 @@
 #include "common/base/ranges.h"
 #include "common/pose/pose.h"
 #include "common/random/stream.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {

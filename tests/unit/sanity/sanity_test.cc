@@ -1,6 +1,4 @@
 // Checks of logs of drives that were drawn from plain kinematics and then spoiled in one way.
-#include "master/io/log_checks/sanity.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,7 +8,7 @@
 #include <utility>
 
 #include "common/external/protocol.h"
-#include "master/io/log_checks/finding.h"
+#include "master/io/log_checks/log_checks.h"
 #include "tests/unit/sanity/drawn_drives.h"
 
 namespace gapfarm::sanity_test {

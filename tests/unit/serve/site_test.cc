@@ -8,7 +8,7 @@
 
 #include "master/serve/pages.h"
 #include "master/store/answer_store.h"
-#include "master/store/command_record.h"
+#include "master/store/records.h"
 #include "tests/unit/store/store_fixture.h"
 
 namespace gapfarm::site_test {

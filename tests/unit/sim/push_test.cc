@@ -6,7 +6,7 @@
 #include <new>
 
 #include "tests/unit/sim/push_test_util.h"
-#include "worker/sim/push/outline.h"
+#include "worker/sim/push/push_engine.h"
 #include "worker/sim/push/push_world.h"
 
 namespace gapfarm::push_test {

@@ -1,5 +1,3 @@
-#include "master/store/command_record.h"
-
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -7,6 +5,7 @@
 
 #include "common/base/build_info.h"
 #include "master/store/answer_store.h"
+#include "master/store/records.h"
 #include "master/store/run_lock.h"
 #include "tests/unit/store/store_fixture.h"
 

@@ -1,8 +1,7 @@
-#include "common/trials/bbautotune.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/trials/text/trial_parser.h"
 #include "tests/unit/trials/trial_text.h"
 
 namespace gapfarm::bbautotune_test {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/trials/read.h"
-#include "common/trials/select.h"
+#include "common/trials/trial.h"
 #include "common/trials/write.h"
 #include "tests/unit/trials/shared_data.h"
 #include "tests/unit/trials/trial_text.h"

@@ -1,7 +1,7 @@
 // A small push problem: a square and a triangle, four pushes each.
 #pragma once
 
-#include "common/parameters/push.h"
+#include "common/parameters/table.h"
 #include "common/problem/problem.h"
 #include "worker/evaluate.h"
 

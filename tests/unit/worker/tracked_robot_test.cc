@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/parameters/srv1_robot_file.h"
-#include "common/robot/robot_file.h"
+#include "common/robot/robot.h"
 #include "common/trials/files.h"
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"

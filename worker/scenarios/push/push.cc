@@ -1,15 +1,12 @@
-#include "common/parameters/push.h"
-
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <vector>
 
+#include "common/parameters/table.h"
 #include "common/problem/problem.h"
 #include "common/random/stream.h"
 #include "common/score/fitness.h"
 #include "gapfarm/v1/task.pb.h"
-#include "worker/scenarios/outcome.h"
 #include "worker/scenarios/push/pushed_piece.h"
 #include "worker/scenarios/scenario.h"
 #include "worker/sim/step_counter.h"

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "common/parameters/push.h"
-#include "worker/scenarios/outcome.h"
+#include "common/parameters/table.h"
+#include "worker/scenarios/scenario.h"
 
 namespace gapfarm {
 namespace {

@@ -13,7 +13,7 @@
 #include "gapfarm/v1/task.pb.h"
 #include "worker/effects/behaviour.h"
 #include "worker/scenarios/motion_memo.h"
-#include "worker/scenarios/outcome.h"
+#include "worker/scenarios/scenario.h"
 #include "worker/sim/robot/motion.h"
 #include "worker/sim/robot/simulator.h"
 #include "worker/sim/step_counter.h"

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/sim/push/outline.h"
 #include "worker/sim/push/push_engine.h"
 
 namespace gapfarm {

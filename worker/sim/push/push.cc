@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "worker/sim/observe.h"
-#include "worker/sim/push/outline.h"
 #include "worker/sim/push/push_engine.h"
 #include "worker/sim/push/push_world.h"
 

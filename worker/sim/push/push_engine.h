@@ -1,8 +1,10 @@
 // The models of pushing, and what they share.  Internal to worker/sim.
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "worker/sim/push/push.h"
 
@@ -43,5 +45,17 @@ class PathRecorder {
   double next_s_ = 0;
   MotionSample last_;
 };
+
+// A convex outline and a point beside it.
+
+// Where a point is nearest to an outline.
+struct Touch {
+  double distance_m = 0;                             // negative inside
+  Eigen::Vector2d point = Eigen::Vector2d::Zero();   // on the outline
+  Eigen::Vector2d normal = Eigen::Vector2d::Zero();  // unit, out of the outline
+};
+
+// REQUIRES: convex corners, counter-clockwise.
+Touch nearest_touch(std::span<const Eigen::Vector2d> corners, const Eigen::Vector2d& p);
 
 }  // namespace gapfarm

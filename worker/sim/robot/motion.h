@@ -8,7 +8,7 @@
 
 #include "common/base/constants.h"
 #include "common/pose/pose.h"
-#include "common/robot/robot_size.h"
+#include "common/robot/robot.h"
 
 namespace gapfarm {
 

@@ -1,0 +1,115 @@
+// Lines with bands over a common axis, as SVG.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/effects/catalogue.h"
+#include "common/pose/pose.h"
+#include "common/problem/problem.h"
+#include "common/svg/svg.h"
+#include "gapfarm/v1/task.pb.h"
+
+namespace gapfarm {
+
+struct ChartSeries {
+  std::string name;
+  std::vector<SvgPoint> line = {};               // data units
+  std::vector<SvgPoint> lower = {}, upper = {};  // ends of a band; empty: none
+  bool dots = false;                             // a dot a point in place of the line
+};
+
+struct ChartLevel {  // a horizontal line
+  std::string name;
+  double y = 0;
+};
+
+struct LineChart {
+  std::string title, x_title, y_title;
+  bool log_x = false;
+  bool log_y = false;                     // points at or below 0 are omitted
+  bool equal_axes = false;                // one unit of x is as long as one of y
+  bool whole_x = false;                   // no ticks between integers
+  std::optional<double> y_least, y_most;  // what is beyond is cut off at the frame
+  std::vector<ChartSeries> series;
+  std::vector<ChartLevel> levels;
+};
+
+// The colour of the i-th series: Okabe and Ito's, then the same dashed.
+std::string series_colour(std::size_t i);
+
+std::string line_chart(const LineChart& chart);
+
+struct ChartBar {
+  std::string name;
+  double value = 0, lower = 0, upper = 0;
+  bool strong = false;  // filled; the others are outlined
+};
+
+// Horizontal bars from 0 with intervals, in the order given; `mark`: a vertical line.
+std::string bar_chart(const std::string& title, const std::string& x_title,
+                      const std::vector<ChartBar>& bars, std::optional<double> mark,
+                      const std::string& mark_name);
+
+// The picture of measured against simulated end poses (`poses.svg`).
+
+// Predicted end poses of one command.
+struct PoseCloud {
+  std::string label;    // "before", "after"
+  Pose mean;            // start frame
+  Eigen::Matrix3d cov;  // of the end pose in the mean's own axes: m^2, m rad, rad^2
+};
+
+// One command.  All poses are ends seen from the start (x ahead, y left).
+struct PosePanel {
+  std::string title;
+  std::vector<Pose> measured;
+  std::vector<PoseCloud> clouds;  // at most kPoseCloudStyles; the last one is drawn on top
+};
+
+inline constexpr std::size_t kPoseCloudStyles = 3;
+
+// One panel a command, three in a row: measured end poses as dots whose ticks point along their
+// heading; each cloud as a mark with its heading and the ellipse that holds 90 % of its positions.
+// Axes are equal and in mm.  A panel shows all clouds and the bulk of the measured poses; those
+// beyond it are counted in a corner.  Shapes and line styles differ as well as colours.
+std::string pose_picture(const std::vector<PosePanel>& panels, const std::string& title,
+                         const std::string& subtitle = "");
+
+// From predictions of a log to the panels of pose_picture().
+struct PredictionOfLog {
+  std::string label;
+  v1::PredictResult prediction;  // one a trial of the problem's log, in its order, with covariances
+};
+
+// One panel a command: its trials at the duties and duration that the log has most of.
+std::vector<PosePanel> pose_panels(const Problem& problem,
+                                   const std::vector<PredictionOfLog>& predictions);
+
+// What an effect does to the scenario's commands, as a picture.
+
+// One drive as the log has it.
+struct LoggedDrive {
+  std::vector<Pose> path;
+  Pose end;
+};
+
+// One command, with and without the effect; poses in the frame of the logged start.
+struct EffectDrives {
+  std::string command;
+  LoggedDrive without;
+  std::vector<LoggedDrive> with;  // more than one where chance has a say
+};
+
+// An SVG with a panel a command: the drive without the effect dashed with a hollow end, with it
+// solid with a filled one, each with a stroke along its heading, and by how much the end differs.
+// The drives are seen from X_WS, heading along the world's x.  Directions, discs, lines and centres
+// among the effect's `values` (in the catalogue's order) are drawn too, recognised by their
+// parameters' names: direction; x, y and radius; position and axis; x, y.
+std::string effect_figure(const Effect& effect, std::span<const double> values, const Pose& X_WS,
+                          std::span<const EffectDrives> drives);
+
+}  // namespace gapfarm
