@@ -81,18 +81,16 @@ void read_parameters(TomlSection& top, const ParameterTable& table, ParameterVal
 }
 
 void for_effect_rows(TomlSection& top, const ParameterTable& table, const EffectRowReader& read) {
-  auto section = top.section("effects");
-  if (!section) return;
-  for (std::size_t e = 0; e < table.effects().size(); ++e) {
-    const Effect& effect = table.effects()[e];
-    auto own = section->section(effect.name);
-    if (!own) continue;
-    for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
-      read(*own, effect.parameters[i].key, table.effect_row(e) + i);
+  top.within("effects", [&](TomlSection& section) {
+    for (std::size_t e = 0; e < table.effects().size(); ++e) {
+      const Effect& effect = table.effects()[e];
+      section.within(effect.name, [&](TomlSection& own) {
+        for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+          read(own, effect.parameters[i].key, table.effect_row(e) + i);
+        }
+      });
     }
-    own->finish();
-  }
-  section->finish();
+  });
 }
 
 void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues& values) {

@@ -1,7 +1,6 @@
 // Reading models.
 #include "common/config/model.h"
 
-#include <charconv>
 #include <limits>
 
 #include "common/base/build_info.h"
@@ -52,71 +51,24 @@ void read_entry(TomlSection& section, const std::string& key, std::size_t row, M
 
 // A hand that moves a row between [parameters] and [noise] does no harm.
 void read_base(TomlSection& top, const char* name, Model& model) {
-  auto section = top.section(name);
-  if (!section) return;
-  for (std::size_t row = 0; row < model.table().size(); ++row) {
-    const Parameter& parameter = model.table()[row];
-    if (parameter.effect.empty()) read_entry(*section, parameter.key, row, model);
-  }
-  section->finish();
+  top.within(name, [&](TomlSection& section) {
+    for (std::size_t row = 0; row < model.table().size(); ++row) {
+      const Parameter& parameter = model.table()[row];
+      if (parameter.effect.empty()) read_entry(section, parameter.key, row, model);
+    }
+  });
 }
 
 void read_model_fitness(TomlSection& top, Model& model) {
-  auto section = top.section("fitness");
-  if (!section) return;
-  // A failed run's best may be infinitely bad; that is no reason not to read its model.
-  if (const toml::node* value = section->find("value")) {
-    model.score = value->is_number() ? value->value<double>() : std::nullopt;
-    if (!model.score)
-      section->fail("value", "value is " + toml_type_name(*value) + ", expected a number");
-  }
-  read_fitness_of(*section, model.fitness);
-  section->finish();
-}
-
-// A seed beyond TOML's integers is written as a string.
-void read_seed(TomlSection& run, std::uint64_t& seed) {
-  const toml::node* node = run.find("seed");
-  if (node == nullptr || !node->is_string()) {
-    run.read("seed", seed, 0);
-    return;
-  }
-  const std::string& text = node->as_string()->get();
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
-  if (code != std::errc{} || end != text.data() + text.size()) {
-    run.fail("seed", "seed is " + quoted_word(text) + ", expected an integer");
-  }
-}
-
-constexpr double kFarthestFrame_m = 10'000;  // as poses of a log
-
-void read_frame(TomlSection& top, Model& model) {
-  auto frame = top.section("frame");
-  if (!frame) return;
-  frame->read("x", model.frame_x_m, -kFarthestFrame_m, kFarthestFrame_m, "m");
-  frame->read("y", model.frame_y_m, -kFarthestFrame_m, kFarthestFrame_m, "m");
-  frame->finish();
-}
-
-void read_origin(TomlSection& top, Model& model) {
-  if (auto data = top.section("data")) {
-    data->read("hash", model.data.hash);
-    data->read("trials", model.data.trials, 0);
-    model.data.files = data->strings("files").value_or(std::vector<std::string>());
-    data->finish();
-  }
-  if (auto program = top.section("program")) {
-    program->read("version", model.version);
-    program->read("fingerprint", model.fingerprint);
-    program->finish();
-  }
-  if (auto run = top.section("run")) {
-    run->read("path", model.origin.run);
-    read_seed(*run, model.origin.seed);
-    run->read("generation", model.origin.generation, 0);
-    run->read("evaluations", model.origin.evaluations, 0);
-    run->finish();
-  }
+  top.within("fitness", [&](TomlSection& section) {
+    // A failed run's best may be infinitely bad; that is no reason not to read its model.
+    if (const toml::node* value = section.find("value")) {
+      model.score = value->is_number() ? value->value<double>() : std::nullopt;
+      if (!model.score)
+        section.fail("value", "value is " + toml_type_name(*value) + ", expected a number");
+    }
+    read_fitness_of(section, model.fitness);
+  });
 }
 
 // What format_model() wrote; nothing is started.
@@ -124,14 +76,13 @@ Status read_model_program(TomlSection& top, Model& model) {
   ExternalCommand command;
   std::string introduction;
   const bool objective = scenario_form(model.scenario).objective;
-  if (auto section = top.section(model.scenario)) {
-    command.argv = section->strings("program").value_or(std::vector<std::string>());
-    section->read("folder", command.folder);
-    section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
-    section->read("introduction", introduction);
-    if (objective) read_objective(*section, model.fitness, model.spread);
-    section->finish();
-  }
+  top.within(model.scenario, [&](TomlSection& section) {
+    section.read("program", command.argv);
+    section.read("folder", command.folder);
+    section.read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
+    section.read("introduction", introduction);
+    if (objective) read_objective(section, model.fitness, model.spread);
+  });
   ASSIGN_OR_RETURN(model.external,
                    make_external_program(std::move(command), std::move(introduction), objective));
   model.values = model.table().nominal();
@@ -215,9 +166,9 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   if (!form.pieces) read_commands(top, model.commands);
   read_model_fitness(top, model);
   read_spread(top, model.spread);
-  read_frame(top, model);
+  frame_section(top, model);
   read_residual(top, model);
-  read_origin(top, model);
+  origin_sections(top, model);
   top.finish();
   if (!errors.empty()) return errors.error();
   return model;

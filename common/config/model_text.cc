@@ -1,6 +1,4 @@
 // Writing models.
-#include <cmath>
-#include <limits>
 
 #include "common/base/text.h"
 #include "common/config/model.h"
@@ -11,192 +9,151 @@
 namespace gapfarm {
 namespace {
 
-// A TOML float: integers would lose the sign of -0.
-std::string toml_number(double value) {
-  std::string text = format_double(value);
-  if (std::isfinite(value) && text.find_first_of(".e") == text.npos) text += ".0";
-  return text;
-}
-
-// TOML integers end at 2^63 - 1; seeds do not.
-std::string toml_count(std::uint64_t value) {
-  const std::string text = std::to_string(value);
-  return value > std::numeric_limits<std::int64_t>::max() ? toml_string(text) : text;
-}
-
 // Numbers of integer rows, words of choices, true and false.
-std::string row_text(const Parameter& row, double value) {
-  if (row.kind == ParameterKind::kReal) return toml_number(value);
-  if (row.kind == ParameterKind::kBoolean) return value != 0 ? "true" : "false";
-  if (row.kind == ParameterKind::kChoice)
-    return toml_string(row.choices[static_cast<std::size_t>(value)]);
-  return format_double(value);
+std::string row_text(const ParameterTable& table, std::size_t row, double value) {
+  if (table[row].kind == ParameterKind::kReal) return toml_number(value);
+  const std::string text = table.text_of(row, value);
+  return table[row].kind == ParameterKind::kChoice ? toml_string(text) : text;
 }
 
-std::string entry(const Model& model, std::size_t row, const std::string& key) {
+void write_entry(const Model& model, std::size_t row, const std::string& key, TomlLines& out) {
   const Parameter& parameter = model.table()[row];
-  std::string text = key + " = { value = " + row_text(parameter, model.values[row]);
+  std::string text = key + " = { value = " + row_text(model.table(), row, model.values[row]);
   if (parameter.kind == ParameterKind::kReal) text += ", unit = " + toml_string(parameter.unit);
   if (row < model.intervals.size() && model.intervals[row]) {
     text += ", lo = " + toml_number(model.intervals[row]->lower) +
             ", hi = " + toml_number(model.intervals[row]->upper);
   }
-  return text + " }" + (parameter.summary.empty() ? "" : "  # " + parameter.summary) + "\n";
+  out.raw(text + " }" + (parameter.summary.empty() ? "" : "  # " + parameter.summary) + "\n");
 }
 
 bool is_noise(const Parameter& row) { return row.key.find("_noise_") != std::string::npos; }
 
-std::string base_section(const Model& model, const char* name, bool noise) {
+void write_base(const Model& model, const char* name, bool noise, TomlLines& out) {
   const bool objective = scenario_form(model.scenario).objective;  // whose rows are its own
-  if (objective && noise) return "";
-  std::string text = std::string("\n[") + name + "]\n";
+  if (objective && noise) return;
   const ParameterTable& table = model.table();
-  for (std::size_t row = 0; row < table.size(); ++row) {
-    if (!table[row].effect.empty() || (!objective && is_noise(table[row])) != noise) continue;
-    text += entry(model, row, table[row].key);
-  }
-  return text;
+  out.within(name, [&](TomlLines& section) {
+    for (std::size_t row = 0; row < table.size(); ++row) {
+      if (!table[row].effect.empty() || (!objective && is_noise(table[row])) != noise) continue;
+      write_entry(model, row, table[row].key, section);
+    }
+  });
 }
 
 // Effects with a parameter or an interval of their own; the others do nothing.
-std::string effect_sections(const Model& model) {
+void write_effects(const Model& model, TomlLines& out) {
   const ParameterTable& table = model.table();
-  std::string text;
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     const Effect& effect = table.effects()[e];
     bool own = false;
-    std::string entries;
+    TomlLines entries;
     for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
       const std::size_t row = table.effect_row(e) + i;
       own = own || model.values[row] != table[row].nominal ||
             (row < model.intervals.size() && model.intervals[row]);
-      entries += entry(model, row, effect.parameters[i].key);
+      write_entry(model, row, effect.parameters[i].key, entries);
     }
-    if (own) text += "\n[effects." + effect.name + "]  # " + effect.summary + "\n" + entries;
+    if (own) {
+      out.raw("\n[effects." + effect.name + "]  # " + effect.summary + "\n" + entries.text());
+    }
   }
-  return text;
 }
 
 // The file as it is, line by line.
-std::string robot_text(const Model& model) {
-  if (model.robot_file.empty()) return "";
-  if (model.robot_file.find("'''") != std::string::npos) {
-    return "robot = " + toml_string(model.robot_file) + "\n";
-  }
-  return "robot = '''\n" + model.robot_file + "'''\n";
+void write_robot(const std::string& file, TomlLines& out) {
+  if (file.empty()) return;
+  if (file.find("'''") != std::string::npos) return out.read("robot", file);
+  out.raw("robot = '''\n" + file + "'''\n");
 }
 
-std::string directions(const FitnessSettings& fitness) {
+void write_directions(const FitnessSettings& fitness, TomlLines& out) {
+  using Names = std::vector<std::string>;
   if (fitness.objectives.empty()) {
-    return std::string("\ndirection = ") +
-           (higher_is_better(fitness.kind) ? "\"maximise\"" : "\"minimise\"");
+    return out.read("direction",
+                    std::string(higher_is_better(fitness.kind) ? "maximise" : "minimise"));
   }
-  std::string senses[2];
-  for (const SearchedObjective& objective : fitness.objectives) {
-    std::string& names = senses[objective.maximise ? 1 : 0];
-    names += (names.empty() ? "" : ", ") + toml_string(objective.name);
-  }
-  std::string text;
-  for (const int i : {0, 1}) {
-    if (senses[i].empty()) continue;
-    text += (i == 0 ? "\nminimise = [" : "\nmaximise = [") + senses[i] + "]";
-  }
-  return text;
-}
-
-std::string program_section(const Model& model) {
-  if (!model.external) return "";
-  const ExternalCommand& command = model.external->command;
-  std::string argv = joined(command.argv, ", ", toml_string);
-  const std::string objective = directions(model.fitness) +
-                                (model.spread.kind == SpreadKind::kSampled ? "\nnoisy = true" : "");
-  return "\n[" + model.scenario + "]\nprogram = [" + argv +
-         "]\nfolder = " + toml_string(command.folder) +
-         "\nanswer_limit = " + toml_number(command.answer_limit_s) +
-         "\nintroduction = " + toml_string(model.external->introduction) +
-         (scenario_form(model.scenario).objective ? objective : "") + "\n";
-}
-
-std::string piece_sections(const Model& model) {
-  std::string text;
-  for (const Piece& piece : model.pieces) {
-    std::string corners;
-    for (const Eigen::Vector2d& c : piece.corners) {
-      corners +=
-          (corners.empty() ? "[" : ", [") + toml_number(c[0]) + ", " + toml_number(c[1]) + "]";
+  for (const bool maximise : {false, true}) {
+    Names names;
+    for (const SearchedObjective& objective : fitness.objectives) {
+      if (objective.maximise == maximise) names.push_back(objective.name);
     }
-    text += "\n[[pieces]]\nname = " + toml_string(piece.name) + "\ncorners = [" + corners +
-            "]\nthickness = " + toml_number(piece.thickness_m) +
-            "\nmass = " + toml_number(piece.mass_kg) +
-            "\nsymmetry = " + std::to_string(piece.symmetry) + "\n";
+    if (!names.empty()) out.read(maximise ? "maximise" : "minimise", names);
   }
-  return text;
 }
 
-std::string command_sections(const Model& model) {
+void write_program(const Model& model, TomlLines& out) {
+  if (!model.external) return;
+  out.within(model.scenario, [&](TomlLines& section) {
+    const ExternalCommand& command = model.external->command;
+    section.read("program", command.argv);
+    section.read("folder", command.folder);
+    section.read("answer_limit", command.answer_limit_s);
+    section.read("introduction", model.external->introduction);
+    if (!scenario_form(model.scenario).objective) return;
+    write_directions(model.fitness, section);
+    if (model.spread.kind == SpreadKind::kSampled) section.read("noisy", true);
+  });
+}
+
+void write_commands(const Model& model, TomlLines& out) {
+  for (const Piece& piece : model.pieces) {
+    out.raw("\n[[pieces]]\n");
+    out.read("name", piece.name);
+    const auto corners = mapped(piece.corners, [](const Eigen::Vector2d& c) {
+      return std::vector<double>{c[0], c[1]};
+    });
+    out.raw("corners = " + toml_rows(corners) + "\n");
+    piece_rows(out, piece);
+  }
   const ScenarioForm& form = scenario_form(model.scenario);
-  if (form.pieces) return piece_sections(model);
-  if (form.robot) return "";
-  std::string text;
+  if (form.pieces || form.robot) return;
   for (const CommandSpec& command : model.commands) {
-    text += "\n[commands." + command.name + "]\nleft = " + toml_number(command.left) +
-            "\nright = " + toml_number(command.right) +
-            "\nduration = " + toml_number(command.duration_s) + "\n";
+    out.within("commands." + command.name, [&](TomlLines& own) { command_rows(own, command); });
   }
-  return text;
 }
 
-std::string score_sections(const Model& model) {
+void write_score(const Model& model, TomlLines& out) {
   const FitnessSettings& fitness = model.fitness;
-  if (is_value(fitness.kind)) {
-    return model.score ? "\n[fitness]\nvalue = " + toml_number(*model.score) + "\n" : "";
-  }
-  std::string text = std::string("\n[fitness]\nkind = ") + toml_string(fitness_name(fitness.kind));
-  if (model.score) text += "\nvalue = " + toml_number(*model.score);
-  text += "\noutlier_share = " + toml_number(fitness.outlier_share) +
-          "\nroll_penalty = " + toml_number(fitness.roll_penalty) +
-          "\npitch_penalty = " + toml_number(fitness.pitch_penalty) +
-          "\nheave_penalty = " + toml_number(fitness.heave_penalty) +
-          "\nrest_penalty = " + toml_number(fitness.rest_penalty) +
-          "\nrest_limit = " + toml_number(fitness.rest_limit_s) + "\n";
-  text += "\n[spread]\nkind = " +
-          toml_string(spread_names()[static_cast<std::size_t>(model.spread.kind)]) + "\n";
-  if (model.spread.kind == SpreadKind::kSampled) {
-    text += "replicates = " + std::to_string(model.spread.replicates) + "\n";
-  }
-  return text;
-}
-
-// Only where it is not the world's own origin.
-std::string frame_section(const Model& model) {
-  if (model.frame_x_m == 0 && model.frame_y_m == 0) return "";
-  return "\n# The effects' places count from this point of the world, in metres.\n[frame]\nx = " +
-         toml_number(model.frame_x_m) + "\ny = " + toml_number(model.frame_y_m) + "\n";
-}
-
-std::string origin_sections(const Model& model) {
-  std::string files = joined(model.data.files, ", ", toml_string);
-  return "\n[data]\nhash = " + toml_string(model.data.hash) +
-         "\ntrials = " + std::to_string(model.data.trials) + "\nfiles = [" + files + "]\n" +
-         "\n[program]\nversion = " + toml_string(model.version) +
-         "\nfingerprint = " + toml_string(model.fingerprint) + "\n" +
-         "\n[run]\npath = " + toml_string(model.origin.run) +
-         "\nseed = " + toml_count(model.origin.seed) +
-         "\ngeneration = " + std::to_string(model.origin.generation) +
-         "\nevaluations = " + std::to_string(model.origin.evaluations) + "\n";
+  const bool value = is_value(fitness.kind);
+  if (value && !model.score) return;
+  out.within("fitness", [&](TomlLines& section) {
+    if (!value) section.read("kind", fitness.kind, fitness_names());
+    section.read("value", model.score);
+    if (!value) fitness_rows(section, fitness);
+  });
+  if (value) return;
+  out.within("spread", [&](TomlLines& section) {
+    section.read("kind", model.spread.kind, spread_names());
+    if (model.spread.kind != SpreadKind::kSampled) return;
+    section.read("replicates", model.spread.replicates, 2, 100000);
+  });
 }
 
 }  // namespace
 
 std::string format_model(const Model& model) {
   const bool objective = scenario_form(model.scenario).objective;
-  return std::string("# A gapfarm model") +
-         (objective ? "" : ": 'gapfarm predict' and 'gapfarm simulate' take it") +
-         ".\nmodel = 1\nscenario = " + toml_string(model.scenario) +
-         "\nkind = " + toml_string(model.kind) + "\n" + robot_text(model) + program_section(model) +
-         base_section(model, "parameters", false) + base_section(model, "noise", true) +
-         effect_sections(model) + frame_section(model) + residual_section(model) +
-         command_sections(model) + score_sections(model) + origin_sections(model);
+  TomlLines out;
+  out.raw(std::string("# A gapfarm model") +
+          (objective ? "" : ": 'gapfarm predict' and 'gapfarm simulate' take it") +
+          ".\nmodel = 1\n");
+  out.read("scenario", model.scenario);
+  out.read("kind", model.kind);
+  write_robot(model.robot_file, out);
+  write_program(model, out);
+  write_base(model, "parameters", false, out);
+  write_base(model, "noise", true, out);
+  write_effects(model, out);
+  if (model.frame_x_m != 0 || model.frame_y_m != 0) {
+    out.raw("\n# The effects' places count from this point of the world, in metres.");
+    frame_section(out, model);
+  }
+  write_residual(model, out);
+  write_commands(model, out);
+  write_score(model, out);
+  origin_sections(out, model);
+  return out.text();
 }
 
 Status check_model(const Model& model) {

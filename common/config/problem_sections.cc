@@ -23,34 +23,20 @@ const std::vector<std::string>& spread_names() {
 }
 
 void read_commands(TomlSection& top, std::vector<CommandSpec>& commands) {
-  auto section = top.section("commands");
-  if (!section) return;
-  for (CommandSpec& command : commands) {
-    auto own = section->section(command.name);
-    if (!own) continue;
-    own->read("left", command.left, -1, 1, "(duty)");
-    own->read("right", command.right, -1, 1, "(duty)");
-    own->read("duration", command.duration_s, 0, 60, "s");
-    own->finish();
-  }
-  section->finish();
+  top.within("commands", [&](TomlSection& section) {
+    for (CommandSpec& command : commands) {
+      section.within(command.name, [&](TomlSection& own) { command_rows(own, command); });
+    }
+  });
 }
 
 void read_fitness(TomlSection& top, FitnessSettings& fitness) {
-  auto section = top.section("fitness");
-  if (!section) return;
-  read_fitness_of(*section, fitness);
-  section->finish();
+  top.within("fitness", [&](TomlSection& section) { read_fitness_of(section, fitness); });
 }
 
 void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
   section.read("kind", fitness.kind, fitness_names());
-  section.read("outlier_share", fitness.outlier_share, 0, kMostOutliers);
-  section.read("roll_penalty", fitness.roll_penalty, 0, kUnbounded, "per rad");
-  section.read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded, "per rad");
-  section.read("heave_penalty", fitness.heave_penalty, 0, kUnbounded, "per m");
-  section.read("rest_penalty", fitness.rest_penalty, 0, kUnbounded, "per s");
-  section.read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
+  fitness_rows(section, fitness);
   const auto objectives = section.strings("objectives");
   if (!objectives) return;
   for (const std::string& name : *objectives) {
@@ -65,15 +51,14 @@ void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
 }
 
 void read_spread(TomlSection& top, SpreadSettings& spread) {
-  auto section = top.section("spread");
-  if (!section) return;
-  section->read("kind", spread.kind, spread_names());
-  section->read("replicates", spread.replicates, 2, 100000);
-  if (spread.kind == SpreadKind::kCubature && section->table().contains("replicates")) {
-    section->fail("replicates",
-                  "replicates belong to kind = \"sampled\"; cubature has fixed points");
-  }
-  section->finish();
+  top.within("spread", [&](TomlSection& section) {
+    section.read("kind", spread.kind, spread_names());
+    section.read("replicates", spread.replicates, 2, 100000);
+    if (spread.kind == SpreadKind::kCubature && section.table().contains("replicates")) {
+      section.fail("replicates",
+                   "replicates belong to kind = \"sampled\"; cubature has fixed points");
+    }
+  });
 }
 
 namespace {
@@ -132,7 +117,7 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
                 "]\n  program = " + example);
   }
   ExternalCommand command;
-  command.argv = section->strings("program").value_or(std::vector<std::string>());
+  section->read("program", command.argv);
   section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
   if (objective) read_objective(*section, problem.fitness, problem.spread);
   section->finish();
@@ -175,9 +160,7 @@ void read_piece(const toml::table& table, const toml::node& node, TomlErrors& er
   if (corners)
     piece.corners = mapped(*corners, [](const auto& c) { return Eigen::Vector2d(c[0], c[1]); });
   const std::size_t origin = section.choice("origin", kOrigins).value_or(0);
-  section.read("thickness", piece.thickness_m, 1e-4, 0.5, "m");
-  section.read("mass", piece.mass_kg, 1e-4, 100, "kg");
-  section.read("symmetry", piece.symmetry, 1, 16);
+  piece_rows(section, piece);
   section.finish();
   const bool twice = std::any_of(pieces.begin(), pieces.end(),
                                  [&](const Piece& other) { return other.name == piece.name; });

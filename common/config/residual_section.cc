@@ -59,55 +59,41 @@ ResidualTerm read_term(TomlSection& section, const Model& model) {
 
 // What is omitted is 0.
 void read_outliers(TomlSection& section, Model& model) {
-  auto read = section.section("strays");
-  if (!read) return;
-  OutlierDrives outliers;
-  read->read("kind", outliers.kind, outlier_kind_names());
-  for (const auto& [key, value] : outlier_values(outliers)) {
-    *value = read->number(key, -1e3, 1e3).value_or(*value);
-  }
-  read->finish();
-  model.residual.outliers = outliers;
+  section.within("strays", [&](TomlSection& own) {
+    OutlierDrives outliers;
+    own.read("kind", outliers.kind, outlier_kind_names());
+    for (const auto& [key, value] : outlier_values(outliers)) own.read(key, *value, -1e3, 1e3);
+    model.residual.outliers = outliers;
+  });
 }
 
-std::string outliers_text(OutlierDrives outliers) {
-  std::string text = "\n[residual.strays]\nkind = \"" +
-                     outlier_kind_names()[static_cast<std::size_t>(outliers.kind)] + "\"\n";
-  for (const auto& [key, value] : outlier_values(outliers)) {
-    if (*value != 0) text += std::string(key) + " = " + format_double(*value) + "\n";
-  }
-  return text;
+void write_outliers(OutlierDrives outliers, TomlLines& out) {
+  out.within("residual.strays", [&](TomlLines& own) {
+    own.read("kind", outliers.kind, outlier_kind_names());
+    for (const auto& [key, value] : outlier_values(outliers)) {
+      if (*value != 0) own.read(key, *value);
+    }
+  });
 }
 
 std::string rows_text(const Eigen::MatrixXd& rows) {
-  std::string text;
-  for (Eigen::Index k = 0; k < rows.rows(); ++k) {
-    text += k == 0 ? "[" : ",\n  ";
-    for (Eigen::Index j = 0; j < rows.cols(); ++j) {
-      text += (j == 0 ? "[" : ", ") + format_double(rows(k, j));
-    }
-    text += "]";
-  }
-  return text + "]";
+  std::vector<std::vector<double>> lists;
+  for (const auto& row : rows.rowwise()) lists.emplace_back(row.begin(), row.end());
+  return toml_rows(lists, ",\n  ");
 }
 
-std::string term_text(const ResidualTerm& term) {
+void write_term(const ResidualTerm& term, TomlLines& out) {
   const auto known = residual_covariates();
-  std::string names, lengths;
-  for (std::size_t j = 0; j < term.covariates.size(); ++j) {
-    const char* separator = j == 0 ? "" : ", ";
-    names += std::string(separator) + '"' + known[term.covariates[j]].name + '"';
-    lengths += separator + format_double(term.lengths[j]);
-  }
-  std::string text = "\n[[residual.terms]]\nframe = \"" +
-                     residual_frame_names()[static_cast<std::size_t>(term.frame)] +
-                     "\"\nby_drive = " + (term.by_drive ? "true" : "false") + "\ncovariates = [" +
-                     names + "]\nlengths = [" + lengths +
-                     "]\ncentres = " + rows_text(term.centres) + "\n[residual.terms.weights]\n";
+  const auto name_of = [&](std::size_t covariate) { return std::string(known[covariate].name); };
+  out.raw("\n[[residual.terms]]\n");
+  out.read("frame", term.frame, residual_frame_names());
+  out.read("by_drive", term.by_drive);
+  out.read("covariates", mapped(term.covariates, name_of));
+  out.raw("lengths = [" + joined(term.lengths, ", ", toml_number) +
+          "]\ncentres = " + rows_text(term.centres) + "\n[residual.terms.weights]\n");
   for (const ResidualWeights& w : term.weights) {
-    text += (w.command.empty() ? kAll : w.command) + " = " + rows_text(w.shifts) + "\n";
+    out.raw((w.command.empty() ? kAll : w.command) + " = " + rows_text(w.shifts) + "\n");
   }
-  return text;
 }
 
 }  // namespace
@@ -157,16 +143,15 @@ void read_residual(TomlSection& top, Model& model) {
   check(node->source().begin);
 }
 
-std::string residual_section(const Model& model) {
-  if (model.residual.empty()) return "";
-  std::string text =
+void write_residual(const Model& model, TomlLines& out) {
+  if (model.residual.empty()) return;
+  out.raw(
       "\n# What nothing in the catalogue explains, as a correction of where drives end; it is no "
       "cause.\n# Each term: sum of weights (m, m, rad) times exp(-|(z - centre) / length|^2 / 2) "
       "over its covariates z.\n# Outliers: a share of drives has an amount, uniform from least to "
-      "most, of what all others have `rest` of.\n[residual]\n";
-  for (const ResidualTerm& term : model.residual.field) text += term_text(term);
-  if (model.residual.outliers) text += outliers_text(*model.residual.outliers);
-  return text;
+      "most, of what all others have `rest` of.\n[residual]\n");
+  for (const ResidualTerm& term : model.residual.field) write_term(term, out);
+  if (model.residual.outliers) write_outliers(*model.residual.outliers, out);
 }
 
 }  // namespace gapfarm

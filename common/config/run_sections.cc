@@ -26,14 +26,13 @@ void read_kinds(TomlSection& section, const char* key, const std::vector<std::st
 }
 
 void read_stop(TomlSection& evolution, EvolutionSettings& to) {
-  auto stop = evolution.section("stop");
-  if (!stop) return;
-  stop->read("generations", to.generations, 1);
-  stop->read("evaluations", to.evaluations, 1);
-  stop->read("time", to.time_s, 1e-3, kUnbounded, "s");
-  stop->read("target_fitness", to.target_fitness, -kUnbounded, kUnbounded);
-  stop->read("stagnation_generations", to.stagnation_generations, 1);
-  stop->finish();
+  evolution.within("stop", [&](TomlSection& stop) {
+    stop.read("generations", to.generations, 1);
+    stop.read("evaluations", to.evaluations, 1);
+    stop.read("time", to.time_s, 1e-3, kUnbounded, "s");
+    stop.read("target_fitness", to.target_fitness, -kUnbounded, kUnbounded);
+    stop.read("stagnation_generations", to.stagnation_generations, 1);
+  });
 }
 
 // Values that are fine alone but not together.  Compares with defaults too, so that a population

@@ -27,6 +27,59 @@ void read_commands(TomlSection& top, std::vector<CommandSpec>& commands);
 // [[pieces]], when the scenario's form has them; they become its commands.
 void read_pieces(TomlSection& top, const ScenarioForm& form, std::vector<Piece>& pieces,
                  std::vector<CommandSpec>& commands);
+// What configs and models hold of these, once: a TomlSection reads it, TomlLines write it.
+template <class Rows, class Command>
+void command_rows(Rows& rows, Command& command) {
+  rows.read("left", command.left, -1, 1, "(duty)");
+  rows.read("right", command.right, -1, 1, "(duty)");
+  rows.read("duration", command.duration_s, 0, 60, "s");
+}
+
+template <class Rows, class OnePiece>
+void piece_rows(Rows& rows, OnePiece& piece) {
+  rows.read("thickness", piece.thickness_m, 1e-4, 0.5, "m");
+  rows.read("mass", piece.mass_kg, 1e-4, 100, "kg");
+  rows.read("symmetry", piece.symmetry, 1, 16);
+}
+
+template <class Rows, class Fitness>
+void fitness_rows(Rows& rows, Fitness& fitness) {
+  rows.read("outlier_share", fitness.outlier_share, 0, kMostOutliers);
+  rows.read("roll_penalty", fitness.roll_penalty, 0, kUnbounded, "per rad");
+  rows.read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded, "per rad");
+  rows.read("heave_penalty", fitness.heave_penalty, 0, kUnbounded, "per m");
+  rows.read("rest_penalty", fitness.rest_penalty, 0, kUnbounded, "per s");
+  rows.read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
+}
+
+template <class Rows, class Of>
+void frame_section(Rows& top, Of& model) {
+  constexpr double kFarthest_m = 10'000;  // as poses of a log
+  top.within("frame", [&](auto& frame) {
+    frame.read("x", model.frame_x_m, -kFarthest_m, kFarthest_m, "m");
+    frame.read("y", model.frame_y_m, -kFarthest_m, kFarthest_m, "m");
+  });
+}
+
+template <class Rows, class Of>
+void origin_sections(Rows& top, Of& model) {
+  top.within("data", [&](auto& data) {
+    data.read("hash", model.data.hash);
+    data.read("trials", model.data.trials, 0);
+    data.read("files", model.data.files);
+  });
+  top.within("program", [&](auto& program) {
+    program.read("version", model.version);
+    program.read("fingerprint", model.fingerprint);
+  });
+  top.within("run", [&](auto& run) {
+    run.read("path", model.origin.run);
+    run.read("seed", model.origin.seed, 0);
+    run.read("generation", model.origin.generation, 0);
+    run.read("evaluations", model.origin.evaluations, 0);
+  });
+}
+
 void read_fitness(TomlSection& top, FitnessSettings& fitness);
 // What of it a model has, too; `section` is not finished.
 void read_fitness_of(TomlSection& section, FitnessSettings& fitness);
@@ -37,9 +90,9 @@ void read_farm(TomlSection& top, FarmSettings& farm);
 void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
                    SimulateSettings& simulate);
 
-// [residual] of a model, and its text; empty where there is none.
+// [residual] of a model; nothing is written where there is none.
 void read_residual(TomlSection& top, Model& model);
-std::string residual_section(const Model& model);
+void write_residual(const Model& model, TomlLines& out);
 Status check_residual_of(const Model& model);
 
 // The value of a row as TOML writes it: a number, a boolean or a choice's word.  None when it is

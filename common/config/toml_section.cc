@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 
 #include "common/base/ranges.h"
@@ -137,6 +138,23 @@ std::optional<double> TomlSection::number(std::string_view key, double lower, do
   return number_of(key, *node, lower, upper, unit);
 }
 
+namespace {
+
+// TOML integers end at 2^63 - 1; what is more is written as a string.
+constexpr auto kMostToml = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+
+std::optional<std::uint64_t> count_of_text(const toml::node& node) {
+  const auto* text = node.as_string();
+  if (text == nullptr) return {};
+  const std::string& digits = text->get();
+  std::uint64_t value = 0;
+  const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  const bool whole = code == std::errc{} && end == digits.data() + digits.size();
+  return whole && value > kMostToml ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
 std::optional<std::uint64_t> TomlSection::count(std::string_view key, std::uint64_t lower,
                                                 std::uint64_t upper) {
   const toml::node* node = find(key);
@@ -146,6 +164,7 @@ std::optional<std::uint64_t> TomlSection::count(std::string_view key, std::uint6
       unbounded ? "an integer of at least " + std::to_string(lower)
                 : "an integer in [" + std::to_string(lower) + ", " + std::to_string(upper) + "]";
   const auto* value = node->as_integer();
+  if (const auto beyond = count_of_text(*node); unbounded && beyond) return beyond;
   if (value == nullptr) {
     wrong_type(key, *node, expected);
     return {};
@@ -261,6 +280,10 @@ void TomlSection::read(std::string_view key, std::string& to) {
   if (auto value = string(key)) to = std::move(*value);
 }
 
+void TomlSection::read(std::string_view key, std::vector<std::string>& to) {
+  if (auto values = strings(key)) to = std::move(*values);
+}
+
 void TomlSection::fail(std::string_view key, const std::string& sentence) {
   if (const toml::node* node = table_->get(key)) errors_->add(*node, sentence);
 }
@@ -279,6 +302,49 @@ void TomlSection::finish(const toml::table& table, const std::string& prefix) {
     const std::string where = name_.empty() ? "" : " in " + name_;
     errors_->add(key.source().begin, kind + quoted_word(word) + where + suggestion(word, known_));
   }
+}
+
+std::string toml_number(double value) {
+  std::string text = format_double(value);
+  if (text.find_first_of(".en") == text.npos) text += ".0";
+  return text;
+}
+
+std::string toml_rows(const std::vector<std::vector<double>>& rows, std::string_view between) {
+  const auto row = [](const auto& numbers) {
+    return "[" + joined(numbers, ", ", toml_number) + "]";
+  };
+  return "[" + joined(rows, between, row) + "]";
+}
+
+void TomlLines::read(const std::string& key, double value, double, double, std::string_view) {
+  raw(key + " = " + toml_number(value) + "\n");
+}
+
+void TomlLines::read(const std::string& key, const std::optional<double>& value, double, double,
+                     std::string_view) {
+  if (value) read(key, *value);
+}
+
+void TomlLines::read(const std::string& key, unsigned value, unsigned, unsigned) {
+  read(key, std::uint64_t{value}, 0);
+}
+
+void TomlLines::read(const std::string& key, std::uint64_t value, std::uint64_t) {
+  const std::string text = std::to_string(value);
+  raw(key + " = " + (value > kMostToml ? toml_string(text) : text) + "\n");
+}
+
+void TomlLines::read(const std::string& key, bool value) {
+  raw(key + (value ? " = true\n" : " = false\n"));
+}
+
+void TomlLines::read(const std::string& key, const std::string& value) {
+  raw(key + " = " + toml_string(value) + "\n");
+}
+
+void TomlLines::read(const std::string& key, const std::vector<std::string>& values) {
+  raw(key + " = [" + joined(values, ", ", toml_string) + "]\n");
 }
 
 }  // namespace gapfarm

@@ -85,6 +85,14 @@ class TomlSection {
   std::optional<std::vector<std::vector<double>>> rows(std::string_view key, std::size_t columns,
                                                        const std::string& expected);
   std::optional<TomlSection> section(std::string_view key);
+  // Lets `use` read the section when it is there, the whole of it; whether it is.
+  template <class Use>
+  bool within(std::string_view key, const Use& use) {
+    std::optional<TomlSection> own = section(key);
+    if (own) use(*own);
+    if (own) own->finish();
+    return own.has_value();
+  }
 
   // The same, put where they belong when the key is there.
   void read(std::string_view key, double& to, double lower, double upper,
@@ -107,6 +115,7 @@ class TomlSection {
   }
   void read(std::string_view key, bool& to);
   void read(std::string_view key, std::string& to);
+  void read(std::string_view key, std::vector<std::string>& to);
 
   // An error at the value of `key`, which must exist.
   void fail(std::string_view key, const std::string& sentence);
@@ -132,5 +141,41 @@ class TomlSection {
   TomlErrors* errors_;
   std::vector<std::string> known_;
 };
+
+// Writes what a TomlSection reads, by the same calls: lines "key = value" of what is there.
+class TomlLines {
+ public:
+  // Bounds and unit are the reader's.
+  void read(const std::string& key, double value, double = 0, double = 0, std::string_view = "");
+  void read(const std::string& key, const std::optional<double>& value, double = 0, double = 0,
+            std::string_view = "");
+  void read(const std::string& key, unsigned value, unsigned, unsigned);
+  void read(const std::string& key, std::uint64_t value, std::uint64_t);
+  void read(const std::string& key, bool value);
+  void read(const std::string& key, const std::string& value);
+  void read(const std::string& key, const std::vector<std::string>& values);
+  template <class Kind>
+  requires std::is_enum_v<Kind>
+  void read(const std::string& key, Kind value, std::span<const std::string> names) {
+    read(key, names[static_cast<std::size_t>(value)]);
+  }
+  // A section, even an empty one.
+  template <class Use>
+  void within(const std::string& name, const Use& use) {
+    raw("\n[" + name + "]\n");
+    use(*this);
+  }
+  void raw(const std::string& text) { text_ += text; }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+// A TOML float: an integer would lose the sign of -0.
+std::string toml_number(double value);
+// "[[0.5, 1.0], ...]", a list a row, `between` them.
+std::string toml_rows(const std::vector<std::vector<double>>& rows,
+                      std::string_view between = ", ");
 
 }  // namespace gapfarm

@@ -56,43 +56,56 @@ void top_rows(Visitor& v, Robot& robot) {
   v.read("full_speed", m.full_speed_rad_s, 1e-3, 1e5, "rad/s");
 }
 
-template <class Visitor, class Steering>
-void steering_rows(Visitor& v, Steering& steering) {
-  v.read("gain", steering.gain, -100, 100);
-  v.read("offset", steering.offset_rad, -2, 2, "rad");
-  v.read("limit", steering.limit_rad, 0, 2, "rad");
-  v.read("rate_limit", steering.rate_limit_rad_s, 1e-3, 1e3, "rad/s");
-}
-
-template <class Visitor, class Throttle>
-void throttle_rows(Visitor& v, Throttle& throttle) {
-  v.read("gain", throttle.gain, 0, 1e4, "m/s^2");
-  v.read("zero", throttle.zero, 0, 1);
-  v.read("back_emf", throttle.back_emf, 0, 1e4, "1/s");
-  v.read("drag", throttle.drag, 0, 1e3, "1/s");
-  v.read("coulomb", throttle.coulomb, 0, 1e3, "m/s^2");
-  v.read("cornering", throttle.cornering, 0, 1e3);
+template <class Visitor, class Robot>
+void steering_sections(Visitor& v, Robot& robot) {
+  v.read("understeer", robot.steering.understeer_s2_m2, 0, 100, "s^2/m^2");
+  v.within("steering", [&](auto& own) {
+    auto& steering = robot.steering;
+    own.read("gain", steering.gain, -100, 100);
+    own.read("offset", steering.offset_rad, -2, 2, "rad");
+    own.read("limit", steering.limit_rad, 0, 2, "rad");
+    own.read("rate_limit", steering.rate_limit_rad_s, 1e-3, 1e3, "rad/s");
+  });
 }
 
 template <class Visitor, class Robot>
-void centre_rows(Visitor& v, Robot& robot) {
-  v.read("x", robot.com_x_m, -50, 50, "m");
-  v.read("y", robot.com_y_m, -50, 50, "m");
-  v.read("z", robot.com_z_m, 1e-4, 50, "m");
+void throttle_section(Visitor& v, Robot& robot) {
+  v.within("throttle", [&](auto& own) {
+    auto& throttle = robot.throttle;
+    own.read("gain", throttle.gain, 0, 1e4, "m/s^2");
+    own.read("zero", throttle.zero, 0, 1);
+    own.read("back_emf", throttle.back_emf, 0, 1e4, "1/s");
+    own.read("drag", throttle.drag, 0, 1e3, "1/s");
+    own.read("coulomb", throttle.coulomb, 0, 1e3, "m/s^2");
+    own.read("cornering", throttle.cornering, 0, 1e3);
+  });
 }
 
 template <class Visitor, class Robot>
-void body_rows(Visitor& v, Robot& robot) {
-  v.read("length", robot.body_length_m, 1e-3, 50, "m");
-  v.read("width", robot.body_width_m, 1e-3, 50, "m");
-  v.read("height", robot.body_height_m, 1e-3, 50, "m");
+void centre_section(Visitor& v, Robot& robot) {
+  v.within("centre_of_mass", [&](auto& own) {
+    own.read("x", robot.com_x_m, -50, 50, "m");
+    own.read("y", robot.com_y_m, -50, 50, "m");
+    own.read("z", robot.com_z_m, 1e-4, 50, "m");
+  });
 }
 
-template <class Visitor, class Pose>
-void marker_rows(Visitor& v, Pose& X_RM) {
-  v.read("x", X_RM.x, -50, 50, "m");
-  v.read("y", X_RM.y, -50, 50, "m");
-  v.read("yaw", X_RM.theta, -7, 7, "rad");
+template <class Visitor, class Robot>
+void body_section(Visitor& v, Robot& robot) {
+  v.within("body", [&](auto& own) {
+    own.read("length", robot.body_length_m, 1e-3, 50, "m");
+    own.read("width", robot.body_width_m, 1e-3, 50, "m");
+    own.read("height", robot.body_height_m, 1e-3, 50, "m");
+  });
+}
+
+template <class Visitor, class Robot>
+void marker_section(Visitor& v, Robot& robot) {
+  v.within("marker", [&](auto& own) {
+    own.read("x", robot.X_RM.x, -50, 50, "m");
+    own.read("y", robot.X_RM.y, -50, 50, "m");
+    own.read("yaw", robot.X_RM.theta, -7, 7, "rad");
+  });
 }
 
 void read_wheel(TomlSection& own, RobotWheel& wheel) {
@@ -123,23 +136,6 @@ void read_wheels(TomlSection& top, std::vector<RobotWheel>& wheels) {
   section->finish();
 }
 
-void read_body(TomlSection& top, GroundRobot& robot) {
-  top_rows(top, robot);
-  top.read("full_surface_speed", robot.motors.full_surface_speed_m_s, 1e-4, 100, "m/s");
-  if (auto own = top.section("centre_of_mass")) {
-    centre_rows(*own, robot);
-    own->finish();
-  }
-  if (auto own = top.section("body")) {
-    body_rows(*own, robot);
-    own->finish();
-  }
-  if (auto own = top.section("marker")) {
-    marker_rows(*own, robot.X_RM);
-    own->finish();
-  }
-}
-
 void read_steering_table(TomlSection& top, RobotSteering& steering) {
   const std::string expected =
       "steering_table is [[command, angle in rad], ...] with two or more ascending commands";
@@ -155,21 +151,8 @@ void read_steering_table(TomlSection& top, RobotSteering& steering) {
   }
 }
 
-void read_steering(TomlSection& top, GroundRobot& robot) {
-  read_steering_table(top, robot.steering);
-  top.read("understeer", robot.steering.understeer_s2_m2, 0, 100, "s^2/m^2");
-  if (auto own = top.section("steering")) {
-    steering_rows(*own, robot.steering);
-    own->finish();
-  }
-  if (auto own = top.section("throttle")) {
-    throttle_rows(*own, robot.throttle);
-    own->finish();
-  }
-}
-
 void read_commands(TomlSection& top, GroundRobot& robot) {
-  if (auto channels = top.strings("commands")) robot.channels = std::move(*channels);
+  top.read("commands", robot.channels);
   const auto has = [&](const char* name) { return contains(robot.channels, name); };
   robot.command = has("v")          ? CommandKind::kTwist
                   : has("throttle") ? CommandKind::kThrottleSteering
@@ -179,72 +162,31 @@ void read_commands(TomlSection& top, GroundRobot& robot) {
   top.read("measured", robot.measured);
 }
 
-// Lines "key = value", of those that are there.
-class Lines {
- public:
-  void word(const char* key, const std::string& value) {
-    text_ += std::string(key) + " = " + toml_string(value) + "\n";
-  }
-  void truth(const char* key, bool value) {
-    text_ += std::string(key) + (value ? " = true\n" : " = false\n");
-  }
-  void number(const char* key, double value) {
-    std::string digits = format_double(value);
-    if (digits.find_first_of(".en") == digits.npos) digits += ".0";
-    text_ += std::string(key) + " = " + digits + "\n";
-  }
-  void number(const char* key, const std::optional<double>& value) {
-    if (value) number(key, *value);
-  }
-  // As TomlSection reads.
-  template <class Number>
-  void read(const char* key, const Number& value, double, double, const char* = "") {
-    number(key, value);
-  }
-  void read(const char* key, bool value) { truth(key, value); }
-  void section(const std::string& name) { text_ += "\n[" + name + "]\n"; }
-  std::string take() { return std::move(text_); }
-  void raw(const std::string& text) { text_ += text; }
-
- private:
-  std::string text_;
-};
-
-void write_top(const GroundRobot& robot, Lines& out) {
-  if (!robot.name.empty()) out.word("name", robot.name);
-  out.word("drive", drive_names()[static_cast<std::size_t>(robot.drive)]);
-  std::string channels = joined(robot.channels, ", ", toml_string);
-  out.raw("commands = [" + channels + "]\n");
-  out.word("command_kind", command_kind_names()[static_cast<std::size_t>(robot.command)]);
-  if (robot.measured) out.truth("measured", true);
+void write_top(const GroundRobot& robot, TomlLines& out) {
+  if (!robot.name.empty()) out.read("name", robot.name);
+  out.read("drive", robot.drive, drive_names());
+  out.read("commands", robot.channels);
+  out.read("command_kind", robot.command, command_kind_names());
+  if (robot.measured) out.read("measured", true);
   top_rows(out, robot);
 }
 
-void write_steering(const GroundRobot& robot, Lines& out) {
-  const RobotSteering& s = robot.steering;
-  if (!s.table.empty()) {
-    std::string pairs;
-    for (const RobotSteering::Point& point : s.table) {
-      pairs += (pairs.empty() ? "[" : ", [") + format_double(point.command) + ", " +
-               format_double(point.angle_rad) + "]";
-    }
-    out.raw("steering_table = [" + pairs + "]\n");
-  }
-  out.number("understeer", s.understeer_s2_m2);
-  out.section("steering");
-  steering_rows(out, s);
-  if (!is_throttled(robot)) return;
-  out.section("throttle");
-  throttle_rows(out, robot.throttle);
+void write_steering_table(const RobotSteering& steering, TomlLines& out) {
+  if (steering.table.empty()) return;
+  const auto pairs = mapped(steering.table, [](const RobotSteering::Point& point) {
+    return std::vector<double>{point.command, point.angle_rad};
+  });
+  out.raw("steering_table = " + toml_rows(pairs) + "\n");
 }
 
-void write_wheel(const RobotWheel& wheel, Lines& out) {
-  out.section("wheels." + toml_string(wheel.name));
-  out.word("kind", wheel_names()[static_cast<std::size_t>(wheel.kind)]);
-  out.word("side", side_names()[static_cast<std::size_t>(wheel.side)]);
-  wheel_rows(out, wheel);
-  if (wheel.roller_angle_rad != 0) out.number("roller_angle", wheel.roller_angle_rad);
-  if (!wheel.group.empty() && wheel.group != wheel.name) out.word("group", wheel.group);
+void write_wheel(const RobotWheel& wheel, TomlLines& out) {
+  out.within("wheels." + toml_string(wheel.name), [&](TomlLines& own) {
+    own.read("kind", wheel.kind, wheel_names());
+    own.read("side", wheel.side, side_names());
+    wheel_rows(own, wheel);
+    if (wheel.roller_angle_rad != 0) own.read("roller_angle", wheel.roller_angle_rad);
+    if (!wheel.group.empty() && wheel.group != wheel.name) own.read("group", wheel.group);
+  });
 }
 
 }  // namespace
@@ -262,8 +204,14 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
     return Error{path + ": no key 'drive', expected one of " + known};
   }
   read_commands(top, robot);
-  read_body(top, robot);
-  read_steering(top, robot);
+  top_rows(top, robot);
+  top.read("full_surface_speed", robot.motors.full_surface_speed_m_s, 1e-4, 100, "m/s");
+  read_steering_table(top, robot.steering);
+  steering_sections(top, robot);
+  throttle_section(top, robot);
+  centre_section(top, robot);
+  body_section(top, robot);
+  marker_section(top, robot);
   read_wheels(top, robot.wheels);
   top.finish();
   if (!errors.empty()) return errors.error();
@@ -277,20 +225,17 @@ Result<GroundRobot> read_robot(const std::string& path) {
 }
 
 std::string format_robot(const GroundRobot& robot) {
-  Lines out;
+  TomlLines out;
   out.raw("# A ground robot: SI units and radians; x ahead, y left (docs/formats.md).\n");
   write_top(robot, out);
-  write_steering(robot, out);
-  out.section("centre_of_mass");
-  centre_rows(out, robot);
-  if (robot.body_length_m || robot.body_width_m || robot.body_height_m) {
-    out.section("body");
-    body_rows(out, robot);
-  }
-  out.section("marker");
-  marker_rows(out, robot.X_RM);
+  write_steering_table(robot.steering, out);
+  steering_sections(out, robot);
+  if (is_throttled(robot)) throttle_section(out, robot);
+  centre_section(out, robot);
+  if (robot.body_length_m || robot.body_width_m || robot.body_height_m) body_section(out, robot);
+  marker_section(out, robot);
   for (const RobotWheel& wheel : robot.wheels) write_wheel(wheel, out);
-  return out.take();
+  return out.text();
 }
 
 }  // namespace gapfarm
