@@ -25,6 +25,13 @@ std::string host_name() {
   return gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
 }
 
+std::string reachable(const std::string& endpoint, const std::string& host) {
+  for (const std::string any : {"tcp://*:", "tcp://0.0.0.0:", "tcp://[::]:"}) {
+    if (endpoint.rfind(any, 0) == 0) return "tcp://" + host + ":" + endpoint.substr(any.size());
+  }
+  return endpoint;
+}
+
 std::string shipped_file(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code error;

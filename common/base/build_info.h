@@ -20,6 +20,9 @@ std::string build_summary(const char* program);
 
 // "unknown" where it has no name.
 std::string host_name();
+// How other machines reach what listens at `endpoint` on `host`: nobody connects to "every address
+// of this machine".
+std::string reachable(const std::string& endpoint, const std::string& host);
 
 // `path`; when it is relative, nothing is there, and share/gapfarm beside the program's folder has
 // a file of that name ("configs/demo.toml"), that one.

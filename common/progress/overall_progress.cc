@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/build_info.h"
 #include "common/base/text.h"
 
 namespace gapfarm {
@@ -12,14 +13,6 @@ constexpr double kLeastPace_s = 0.5;
 
 constexpr double kGrace_s = 1, kLocalGrace_s = 5;
 constexpr double kPatience_s = 30;
-
-// Nobody connects to "every address of this machine".
-std::string reachable(const std::string& endpoint) {
-  for (const std::string any : {"tcp://0.0.0.0:", "tcp://*:", "tcp://[::]:"}) {
-    if (endpoint.rfind(any, 0) == 0) return "tcp://THIS_HOST:" + endpoint.substr(any.size());
-  }
-  return endpoint;
-}
 
 }  // namespace
 
@@ -135,7 +128,7 @@ std::string progress_line(const ProgressView& view) {
 WorkerWait::WorkerWait(const std::vector<std::string>& endpoints) {
   for (const std::string& endpoint : endpoints) {
     where_ += (where_.empty() ? " at " : ", ") + endpoint;
-    if (connect_.empty()) connect_ = reachable(endpoint);
+    if (connect_.empty()) connect_ = reachable(endpoint, "THIS_HOST");
   }
 }
 

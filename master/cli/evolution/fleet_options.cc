@@ -175,13 +175,6 @@ Result<double> wall_time_s(const std::string& text) {
   return sum;
 }
 
-std::string reachable(const std::string& endpoint, const std::string& host) {
-  for (const std::string any : {"tcp://*:", "tcp://0.0.0.0:", "tcp://[::]:"}) {
-    if (endpoint.rfind(any, 0) == 0) return "tcp://" + host + ":" + endpoint.substr(any.size());
-  }
-  return endpoint;
-}
-
 Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& endpoint,
                                   const std::string& keys, bool insecure) {
   RETURN_IF_ERROR(choice.check());

@@ -40,9 +40,6 @@ struct FleetChoice {
 // "90", "1:30:00" or "2-00:00:00", in seconds.
 Result<double> wall_time_s(const std::string& text);
 
-// The address that other machines reach a master at, by what it listens at on `host`.
-std::string reachable(const std::string& endpoint, const std::string& host);
-
 Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& endpoint,
                                   const std::string& keys, bool insecure);
 

@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/build_info.h"
 #include "common/base/text.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
