@@ -9,8 +9,10 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 
 #include "common/base/clock.h"
 
@@ -97,7 +99,7 @@ class MemoryFile {
   int fd_;
 };
 
-// True: it has not ended within `timeout_s` and was killed.
+// As await_child().
 bool await(pid_t pid, double timeout_s, const FdWaiter& wait, int* status) {
   const int pidfd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
   const double until = monotonic_seconds() + timeout_s;
@@ -105,16 +107,27 @@ bool await(pid_t pid, double timeout_s, const FdWaiter& wait, int* status) {
   bool ended = pidfd < 0;
   for (double left = timeout_s; !ended && left > 0; left = until - monotonic_seconds()) {
     if (wait) wait(pidfd, left);
-    ended = poll(&polled, 1, wait ? 0 : static_cast<int>(left * 1000) + 1) > 0;
+    const double most_s = wait ? 0 : std::min(left, 3600.0);
+    ended = poll(&polled, 1, static_cast<int>(std::ceil(most_s * 1000))) > 0;
   }
   if (!ended) kill(pid, SIGKILL);
   while (waitpid(pid, status, 0) < 0 && errno == EINTR) {
   }
   if (pidfd >= 0) close(pidfd);
-  return !ended;
+  return ended;
 }
 
 }  // namespace
+
+bool await_child(pid_t pid, double patience_s, int* status) {
+  return await(pid, patience_s, {}, status);
+}
+
+OwnedChild::~OwnedChild() {
+  kill(pid_, SIGTERM);
+  int status = 0;
+  await_child(pid_, patience_s_, &status);
+}
 
 Result<pid_t> start_child(const ChildSetup& setup) {
   int reported[2];
@@ -163,7 +176,7 @@ Result<Captured> run_captured(ChildSetup setup, const std::string& input, double
   setup.err = err.fd();
   ASSIGN_OR_RETURN(const auto pid, start_child(setup));
   Captured captured;
-  captured.timed_out = await(pid, timeout_s, wait, &captured.status);
+  captured.timed_out = !await(pid, timeout_s, wait, &captured.status);
   captured.out = out.text();
   captured.err = err.text();
   return captured;

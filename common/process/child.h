@@ -32,6 +32,22 @@ struct ChildSetup {
 // starting, in the system's words ("No such file or directory").
 Result<pid_t> start_child(const ChildSetup& setup);
 
+// Waits until it has ended; beyond `patience_s` it is killed.  `status`: of waitpid().  False: it
+// was killed.
+bool await_child(pid_t pid, double patience_s, int* status);
+
+// A child that is asked to end (SIGTERM) with this, and made to after `patience_s`.
+class OwnedChild {
+ public:
+  OwnedChild(pid_t pid, double patience_s) : pid_(pid), patience_s_(patience_s) {}
+  ~OwnedChild();
+  OwnedChild& operator=(OwnedChild&&) = delete;
+
+ private:
+  pid_t pid_;
+  double patience_s_;
+};
+
 // Of a status of waitpid(): "exited with status 3", "was killed by signal 9 (Killed)".
 std::string end_text(int status);
 

@@ -5,10 +5,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
-#include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -329,9 +327,7 @@ Result<int> run_shell(const std::string& text, const std::vector<std::string>& v
   const Result<pid_t> pid = start_child(setup);
   if (!pid) return Error{"cannot start it: " + pid.error().message};
   int status = 0;
-  while (waitpid(*pid, &status, 0) < 0) {
-    if (errno != EINTR) return Error{std::string("lost sight of it: ") + std::strerror(errno)};
-  }
+  await_child(*pid, std::numeric_limits<double>::infinity(), &status);
   return WIFEXITED(status) ? WEXITSTATUS(status) : kExitSignalBase + WTERMSIG(status);
 }
 

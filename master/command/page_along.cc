@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -14,7 +13,6 @@
 
 #include "common/base/clock.h"
 #include "common/base/text.h"
-#include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/command/console.h"
 #include "master/serve/request.h"
@@ -23,7 +21,6 @@ namespace gapfarm {
 namespace {
 
 constexpr int kStartLimit_ms = 20000;
-constexpr int kEndLimit_ms = 3000;
 constexpr int kLower = 10;  // a page can wait, a simulation should not
 constexpr std::string_view kAddress = "serving http://127.0.0.1:";
 constexpr std::string_view kTunnel = "from another machine: ";
@@ -102,15 +99,7 @@ std::string PageAlong::hear() const {
   return output;
 }
 
-PageAlong::~PageAlong() {
-  ::kill(pid_, SIGTERM);
-  int status = 0;
-  for (int waited_ms = 0; ::waitpid(pid_, &status, WNOHANG) == 0; waited_ms += 10) {
-    if (waited_ms == kEndLimit_ms) ::kill(pid_, SIGKILL);
-    ::poll(nullptr, 0, 10);
-  }
-  ::close(out_);
-}
+PageAlong::~PageAlong() { ::close(out_); }
 
 Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
                                              const std::filesystem::path& folder,

@@ -1,8 +1,6 @@
 // --page: a command's folder in a browser for as long as the command goes on.
 #pragma once
 
-#include <sys/types.h>
-
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
@@ -10,6 +8,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "common/process/child.h"
 
 namespace gapfarm {
 
@@ -29,7 +28,6 @@ struct PageOption {
 class PageAlong {
  public:
   ~PageAlong();
-  PageAlong& operator=(PageAlong&&) = delete;
 
   // Errors: the program cannot be started, the port is taken; as the server says it.
   static Result<std::unique_ptr<PageAlong>> start(const std::filesystem::path& folder,
@@ -38,12 +36,12 @@ class PageAlong {
   const std::string& tunnel() const { return tunnel_; }  // "ssh -L ..."
 
  private:
-  PageAlong(pid_t pid, int out) : pid_(pid), out_(out) {}
+  PageAlong(pid_t pid, int out) : out_(out), server_(pid, /*patience_s=*/3) {}
   // What the server reported until it served or ended.
   std::string hear() const;
 
-  pid_t pid_;
   int out_;  // its standard output
+  OwnedChild server_;
   unsigned port_ = 0;
   std::string tunnel_;
 };

@@ -76,11 +76,11 @@ Result<std::unique_ptr<Farm>> open_farm(const RunStore& store, const Config& con
   return std::unique_ptr<Farm>(std::move(farm));
 }
 
-Result<std::unique_ptr<WorkersBeside>> start_beside(const EvolutionOptions& options,
-                                                    const std::vector<std::string>& endpoints) {
+Result<std::unique_ptr<OwnedChild>> start_beside(const EvolutionOptions& options,
+                                                 const std::vector<std::string>& endpoints) {
   for (const std::string& endpoint : endpoints) {
     if (endpoint.rfind("tcp://", 0) != 0) continue;
-    return WorkersBeside::start(options.fleet, reachable(endpoint, host_name()), options.farm.keys,
+    return start_workers_beside(options.fleet, reachable(endpoint, host_name()), options.farm.keys,
                                 options.farm.insecure);
   }
   return Error{"--workers-on needs an endpoint that workers reach; give --listen tcp://*:PORT"};
@@ -174,7 +174,7 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   log.copy_to(context.console.kept());
   OnConsole watcher(context.console);
   std::unique_ptr<PageAlong> page;
-  std::unique_ptr<WorkersBeside> beside;
+  std::unique_ptr<OwnedChild> beside;
   const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<Farm>> {
     ASSIGN_OR_RETURN(page, open_page(options.page, store.run(), context));
     auto made = open_farm(store, config, options, log, keep, context);

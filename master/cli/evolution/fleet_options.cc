@@ -1,9 +1,5 @@
 #include "master/cli/evolution/fleet_options.h"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <sys/wait.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -11,7 +7,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
-#include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "common/trials/files.h"
 #include "master/farm/local_workers.h"
@@ -23,7 +18,7 @@ namespace {
 // that would not be done; a quarter of what is short.
 constexpr double kMostMargin_s = 30;
 // Longer than the fleet takes at most to take its jobs away (FleetLoopOptions::drain_limit_s).
-constexpr int kLeaveLimit_ms = 90000;
+constexpr double kLeaveLimit_s = 90;
 
 std::string whole_path(const std::string& path) {
   std::error_code code;
@@ -209,10 +204,9 @@ Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& 
   return options;
 }
 
-Result<std::unique_ptr<WorkersBeside>> WorkersBeside::start(const FleetChoice& choice,
-                                                            const std::string& endpoint,
-                                                            const std::string& keys,
-                                                            bool insecure) {
+Result<std::unique_ptr<OwnedChild>> start_workers_beside(const FleetChoice& choice,
+                                                         const std::string& endpoint,
+                                                         const std::string& keys, bool insecure) {
   ChildSetup setup;
   setup.arguments = {executable_path(), "workers", "--connect", endpoint};
   if (insecure)
@@ -225,15 +219,7 @@ Result<std::unique_ptr<WorkersBeside>> WorkersBeside::start(const FleetChoice& c
   setup.leads_group = true;  // Ctrl-C is for the command, which ends this when it is done
   const Result<pid_t> pid = start_child(setup);
   if (!pid) return Error{"--workers-on " + choice.system + ": " + pid.error().message};
-  return std::unique_ptr<WorkersBeside>(new WorkersBeside(*pid));
-}
-
-WorkersBeside::~WorkersBeside() {
-  kill(pid_, SIGTERM);
-  for (int waited_ms = 0; waitpid(pid_, nullptr, WNOHANG) == 0; waited_ms += 20) {
-    if (waited_ms >= kLeaveLimit_ms) kill(pid_, SIGKILL);
-    poll(nullptr, 0, 20);
-  }
+  return std::make_unique<OwnedChild>(*pid, kLeaveLimit_s);
 }
 
 }  // namespace gapfarm

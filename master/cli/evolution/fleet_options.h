@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/process/child.h"
 #include "master/command/console.h"
 #include "master/farm/sites/fleet.h"
 
@@ -43,20 +44,9 @@ Result<double> wall_time_s(const std::string& text);
 Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& endpoint,
                                   const std::string& keys, bool insecure);
 
-// `gapfarm workers` as a child, while it lives.
-class WorkersBeside {
- public:
-  static Result<std::unique_ptr<WorkersBeside>> start(const FleetChoice& choice,
-                                                      const std::string& endpoint,
-                                                      const std::string& keys, bool insecure);
-  // Waits until they are taken away.
-  ~WorkersBeside();
-  WorkersBeside(const WorkersBeside&) = delete;
-  WorkersBeside& operator=(const WorkersBeside&) = delete;
-
- private:
-  explicit WorkersBeside(pid_t pid) : pid_(pid) {}
-  pid_t pid_;
-};
+// `gapfarm workers` as a child, while it lives; then its workers are taken away.
+Result<std::unique_ptr<OwnedChild>> start_workers_beside(const FleetChoice& choice,
+                                                         const std::string& endpoint,
+                                                         const std::string& keys, bool insecure);
 
 }  // namespace gapfarm
