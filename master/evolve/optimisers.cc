@@ -13,13 +13,9 @@
 
 namespace gapfarm {
 
-using MakeMethod = std::unique_ptr<SearchMethod>(const MethodSetup& setup);
-#define METHOD(name, file, Class, summary) MakeMethod make_method_##Class;
-#include "common/config/methods.inc"
-
 namespace {
 
-template <MakeMethod& make_method>
+template <std::unique_ptr<SearchMethod> (&make_method)(const MethodSetup& setup)>
 Result<std::unique_ptr<Optimiser>> make(const OptimiserSetup& setup) {
   if (!setup.spread.empty() && setup.spread.size() != setup.genes.size() * setup.genes.size()) {
     return Error{"the spread of the first genome is not one of its genes"};

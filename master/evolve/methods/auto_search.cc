@@ -8,7 +8,6 @@
 #include "master/evolve/methods/cma_es.h"
 #include "master/evolve/methods/differential_evolution.h"
 #include "master/evolve/methods/local_search.h"
-#include "master/evolve/methods/random_search.h"
 
 namespace gapfarm {
 namespace {
@@ -70,7 +69,7 @@ class AutoSearch final : public SearchMethod {
   bool roomy_;         // evaluations enough for CMA-ES to begin anew
   std::string reason_;
   Phase phase_ = kGlobal;
-  RandomSearch probe_;
+  std::unique_ptr<SearchMethod> probe_;
   LocalSearch descent_;
   std::unique_ptr<SearchMethod> global_;
 };
@@ -78,7 +77,7 @@ class AutoSearch final : public SearchMethod {
 AutoSearch::AutoSearch(const MethodSetup& setup)
     : setup_(setup),
       roomy_(setup.evaluations / kRoomy_perGene >= setup.space.size()),
-      probe_(for_descent(setup)),
+      probe_(make_method_RandomSearch(for_descent(setup))),
       descent_(for_descent(setup), false) {
   const std::size_t n = setup.space.size();
   const std::string genes = std::to_string(n) + " genes";
@@ -126,7 +125,7 @@ void AutoSearch::begin_global() {
 }
 
 const SearchMethod& AutoSearch::current() const {
-  if (phase_ == kProbing) return probe_;
+  if (phase_ == kProbing) return *probe_;
   if (phase_ == kDescending) return descent_;
   return *global_;
 }

@@ -82,5 +82,9 @@ Error damaged_method_state(const std::string& method);
   std::unique_ptr<SearchMethod> make_method_##Class(const MethodSetup& setup) { \
     return std::make_unique<Class>(setup);                                      \
   }
+// Of every row of methods.inc.
+#define METHOD(name, file, Class, summary) \
+  std::unique_ptr<SearchMethod> make_method_##Class(const MethodSetup& setup);
+#include "common/config/methods.inc"
 
 }  // namespace gapfarm
