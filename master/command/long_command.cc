@@ -52,8 +52,6 @@ std::string state_folder() {
   return {};
 }
 
-bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
-
 }  // namespace
 
 std::string state_of_exit(int exit_code) {
@@ -95,13 +93,16 @@ class LongCommand::Asked : public RecordedFarm {
   Asked(std::shared_ptr<Farm> farm, LongCommand& work)
       : RecordedFarm(farm, work.answers_.get()), work_(work), wait_(farm->endpoints()) {
     set_stage(work.stage_);
-    work.farm_here(*farm);
+    work.record_.listens(*farm);
     watch([this](const RecordedProgress& progress) {
       set_stage(work_.stage_);
       work_.on_progress(progress, *this, wait_);
     });
   }
-  ~Asked() override { work_.farm_gone(); }
+  ~Asked() override {
+    work_.record_.leave();
+    work_.before_ = work_.now_;
+  }
 
  private:
   LongCommand& work_;
@@ -216,33 +217,14 @@ void LongCommand::on_progress(const RecordedProgress& progress, const Farm& farm
     progress_.answered(now_.remembered - stage_began_.remembered,
                        now_.simulated - stage_began_.simulated);
   }
-  workers_ = farm.workers();
-  fleets_ = farm.fleets();
-  const auto there = std::ranges::count_if(workers_, present);
-  const std::string waiting = wait.message(there, monotonic_seconds()).value_or("");
-  const bool news = waiting.empty() != waiting_.empty();
-  waiting_ = waiting;
-  show(news);
-}
-
-void LongCommand::farm_here(const Farm& farm) {
-  for (const std::string& endpoint : farm.endpoints()) {
-    if (record_.listen.empty() && endpoint.rfind("tcp://", 0) == 0) record_.listen = endpoint;
-  }
-}
-
-void LongCommand::farm_gone() {
-  record_.listen.clear();
-  fleets_.clear();
-  before_ = now_;
-  waiting_.clear();
-  workers_.clear();
+  show(record_.look_at(farm, wait, monotonic_seconds()));
 }
 
 void LongCommand::show(bool news) {
   const ProgressView view = progress_.at(monotonic_seconds());
-  console_.progress(record_.command + ": " + (waiting_.empty() ? progress_line(view) : waiting_),
-                    news);
+  console_.progress(
+      record_.command + ": " + (record_.waiting.empty() ? progress_line(view) : record_.waiting),
+      news);
   if (monotonic_seconds() - written_s_ >= kRecordInterval_s) write_record();
 }
 
@@ -251,9 +233,6 @@ void LongCommand::write_record() {
   written_s_ = monotonic_seconds();
   static_cast<ProgressView&>(record_) = progress_.at(written_s_);
   if (record_.state == "finished") record_.share = 1;
-  record_.waiting = waiting_;
-  record_.fleets = fleets_;
-  record_.workers = workers_;
   record_.heartbeat_unix_s = unix_now_s();
   // A courtesy: the command goes on when it cannot be written.
   const auto text = json_text(to_json(record_));

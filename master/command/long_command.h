@@ -85,8 +85,6 @@ class LongCommand {
   void entered();
   void plan_stages();
   void on_progress(const RecordedProgress& progress, const Farm& farm, WorkerWait& wait);
-  void farm_here(const Farm& farm);
-  void farm_gone();
   void show(bool news = false);
   void write_record();
 
@@ -99,10 +97,7 @@ class LongCommand {
   std::string also_, also_in_;
   std::string stage_;
   RecordedProgress before_, now_, stage_began_;  // of farms that are gone; in all; then
-  std::string waiting_;                          // for workers; empty: not
-  std::vector<WorkerStatus> workers_;
-  std::vector<FleetStatus> fleets_;
-  bool counts_itself_ = false;  // the present stage
+  bool counts_itself_ = false;                   // the present stage
   double written_s_ = -1e9;
   std::int64_t at_hand_ = 0;
 };

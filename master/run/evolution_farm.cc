@@ -5,7 +5,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/problem/problem.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {
@@ -85,9 +84,7 @@ FarmProgressWriter::FarmProgressWriter(RunStore& store, Farm& farm,
       watcher_(watcher),
       began_s_(clock.now_s()),
       wait_(farm.endpoints()) {
-  for (const std::string& endpoint : farm.endpoints()) {
-    if (last_.listen.empty() && endpoint.rfind("tcp://", 0) == 0) last_.listen = endpoint;
-  }
+  last_.listens(farm);
   if (!resumed) return;
   generation_ = resumed->generation;
   evaluations_of_others_ = resumed->evaluations;
@@ -165,16 +162,11 @@ void FarmProgressWriter::refresh(double now_s) {
   pace.evaluations_here = done;
   pace.wall_here_s = spent_s;
   last_.time_left_s = time_left_s(settings_, pace);
-  const std::vector<WorkerStatus> workers = farm_.workers();
-  const bool waited = !last_.waiting.empty();
-  last_.waiting = wait_.message(workers.size(), now_s).value_or("");
-  watcher_.progress("evolve: " + (last_.waiting.empty() ? message(pace) : last_.waiting),
-                    waited == last_.waiting.empty());
+  const bool news = last_.look_at(farm_, wait_, now_s);
+  watcher_.progress("evolve: " + (last_.waiting.empty() ? message(pace) : last_.waiting), news);
   if (now_s - written_s_ < kWriteInterval_s) return;
   written_s_ = now_s;
   if (events_ != nullptr) events_->flush();
-  last_.workers = workers;
-  last_.fleets = farm_.fleets();
   last_.farm = farm_.tally();
   // The live row is a courtesy: a run goes on when it cannot be written, and a commit that cannot
   // be written stops it with the reason.

@@ -7,7 +7,6 @@
 #include "common/base/hash.h"
 #include "common/base/ranges.h"
 #include "common/json/fields.h"
-#include "common/json/json.h"
 #include "common/math/fronts.h"
 #include "gapfarm/v1/problem.pb.h"
 #include "master/store/answer_store.h"
@@ -251,6 +250,33 @@ constexpr auto kRecord = [](auto& v, auto& row) {
 
 }  // namespace
 
+void LiveStatus::listens(const Farm& farm) {
+  for (const std::string& endpoint : farm.endpoints()) {
+    if (listen.empty() && endpoint.rfind("tcp://", 0) == 0) listen = endpoint;
+  }
+}
+
+bool LiveStatus::look_at(const Farm& farm, WorkerWait& wait, double now_s) {
+  workers = farm.workers();
+  fleets = farm.fleets();
+  const auto there = std::ranges::count_if(
+      workers, [](const WorkerStatus& worker) { return worker.state != "gone"; });
+  const bool waited = !waiting.empty();
+  waiting = wait.message(static_cast<std::size_t>(there), now_s).value_or("");
+  return waited == waiting.empty();
+}
+
+void LiveStatus::leave() {
+  waiting.clear();
+  workers.clear();
+  fleets.clear();
+  listen.clear();
+}
+
+std::string LiveStatus::gone_text() const {
+  return "crashed: process " + std::to_string(pid) + " on " + host + " is gone without a word";
+}
+
 std::filesystem::path answer_file(const std::filesystem::path& folder) {
   return folder / "simulations.sqlite";
 }
@@ -289,15 +315,12 @@ Result<std::optional<CommandRecord>> command_status(const std::filesystem::path&
   const double age_s = now_unix_s - record.heartbeat_unix_s;
   if (record.state == "running" && !holder_lives(folder, record.host, age_s, kFreshRecord_s)) {
     record.state = "stopped";
-    record.reason = "crashed: process " + std::to_string(record.pid) + " on " + record.host +
-                    " is gone without a word";
+    record.reason = record.gone_text();
   }
   if (record.state != "running") {
     record.time_left_s.reset();
     if (record.state == "finished") record.time_left_s = 0;
-    record.workers.clear();
-    record.fleets.clear();
-    record.waiting.clear();
+    record.leave();
   }
   return std::optional<CommandRecord>(std::move(record));
 }

@@ -98,22 +98,34 @@ struct StoredDocument {
   std::string json;
 };
 
-// The live part: what a running master last reported about itself.
-struct Progress {
-  RunState state = RunState::kRunning;
-  std::string stop_reason;  // empty while running
-  std::string waiting;      // while running: what it waits for, empty when it does not
-  double rate_per_s = 0;    // evaluations
-  std::optional<double> time_left_s;
-  std::uint64_t done = 0, total = 0;  // tasks of the generation in work
+// What whoever works, a run's master or another long command, last reported of itself and its farm.
+struct LiveStatus {
+  std::string waiting;  // what it waits for; empty: nothing
   std::vector<WorkerStatus> workers;
   std::vector<FleetStatus> fleets;
-  std::string listen;  // for workers: its first tcp:// endpoint; empty: none
-  FarmTally farm;
-  // Set by the store:
+  std::string listen;  // for workers: the first tcp:// endpoint; empty: none
   std::int64_t pid = 0;
   std::string host;
   double heartbeat_unix_s = 0;
+
+  void listens(const Farm& farm);
+  // Whom the farm has now.  Whether it has begun or ended to wait for workers.
+  bool look_at(const Farm& farm, WorkerWait& wait, double now_s);
+  // Without a farm there is nobody to wait for.
+  void leave();
+  // Why it is over, of one whose process has gone.
+  std::string gone_text() const;
+};
+
+// The live part: what a running master last reported about itself.
+struct Progress : LiveStatus {
+  RunState state = RunState::kRunning;
+  std::string stop_reason;  // empty while running
+  double rate_per_s = 0;    // evaluations
+  std::optional<double> time_left_s;
+  std::uint64_t done = 0, total = 0;  // tasks of the generation in work
+  FarmTally farm;
+  // Set by the store, with process, host and heartbeat:
   std::uint64_t epoch = 0;  // masters that have written to this run, this one included
 };
 
@@ -149,20 +161,14 @@ struct StageFinding {
   Finding found;
 };
 
-struct CommandRecord : ProgressView {
+struct CommandRecord : ProgressView, LiveStatus {
   std::string command;                 // "diagnose"
   std::string arguments;               // the whole command line
   std::string state;                   // "running", "finished", "stopped", "failed"
   std::string reason;                  // how it ended; empty while it runs
   std::vector<StageRecord> plan;       // all stages in their order
   std::vector<StageFinding> findings;  // so far, in the order in which they came
-  std::string waiting;                 // what it waits for; empty: nothing
-  std::vector<WorkerStatus> workers;
-  std::vector<FleetStatus> fleets;
-  std::string listen;  // for workers: the first tcp:// endpoint; empty: none
-  double began_unix_s = 0, heartbeat_unix_s = 0;
-  std::int64_t pid = 0;
-  std::string host;
+  double began_unix_s = 0;
 };
 
 Json to_json(const CommandRecord& record);

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/json/fields.h"
-#include "common/json/json.h"
 #include "master/store/run_lock.h"
 #include "master/store/schema.h"
 
@@ -275,8 +274,7 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
   if (status.state == RunState::kRunning &&
       !master_lives(reader, status.progress, status.heartbeat_age_s)) {
     status.state = RunState::kStopped;
-    status.stop_reason = "crashed: process " + std::to_string(status.progress.pid) + " on " +
-                         status.progress.host + " is gone without a word";
+    status.stop_reason = status.progress.gone_text();
   }
   if (status.state == RunState::kRunning) {
     status.rate_per_s = status.progress.rate_per_s;
@@ -286,8 +284,7 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     const double evaluations = static_cast<double>(status.evaluations);
     status.rate_per_s = status.wall_s > 0 ? evaluations / status.wall_s : 0;
     if (status.state == RunState::kFinished) status.time_left_s = 0;
-    status.progress.workers.clear();
-    status.progress.fleets.clear();
+    status.progress.leave();
   }
   return status;
 }

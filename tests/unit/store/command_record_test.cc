@@ -115,4 +115,32 @@ TEST_F(CommandRecordTest, ForgettingTakesAnswersOutOfTheFileAndLeavesTheRecord) 
   EXPECT_NE(bytes.find("compared"), bytes.npos);
 }
 
+// Its only worker has gone.
+class EmptiedFarm : public Farm {
+ public:
+  std::string add_problem(const v1::Problem&) override { return {}; }
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string&, const std::vector<v1::Task>&,
+      const std::function<void(const FarmProgress&)>&) override {
+    return std::vector<v1::TaskResult>();
+  }
+  std::vector<WorkerStatus> workers() const override {
+    return {{"local-1", "here", "gone", 0, 4, 0.0}};
+  }
+  std::vector<std::string> endpoints() const override { return {"tcp://here:5555"}; }
+};
+
+TEST(LiveStatusTest, WaitsForWorkersOnceAllHaveGone) {
+  const EmptiedFarm farm;
+  WorkerWait wait(farm.endpoints());
+  LiveStatus status;
+  status.listens(farm);
+  EXPECT_EQ(status.listen, "tcp://here:5555");
+  EXPECT_FALSE(status.look_at(farm, wait, 0)) << "they may be on their way";
+  EXPECT_TRUE(status.look_at(farm, wait, 3));
+  EXPECT_THAT(status.waiting, HasSubstr("waiting for workers at tcp://here:5555"));
+  EXPECT_EQ(status.workers.size(), 1u);
+  EXPECT_FALSE(status.look_at(farm, wait, 4)) << "nothing new";
+}
+
 }  // namespace gapfarm::command_record_test
