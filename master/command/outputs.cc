@@ -14,7 +14,6 @@
 #include "common/base/text.h"
 #include "common/config/config.h"
 #include "common/trials/files.h"
-#include "common/trials/trial.h"
 #include "master/store/records.h"
 
 namespace gapfarm {
@@ -212,6 +211,31 @@ Status Outputs::write_in(const std::string& folder, const NamedTexts& files) con
     if (!text.empty()) RETURN_IF_ERROR(write((fs::path(folder) / name).string(), text));
   }
   return {};
+}
+
+void LongOptions::declare(CLI::App& app, Leaves leaves, bool remote) {
+  outputs.declare(app);
+  if (leaves == Leaves::kFile) keep.declare(app);
+  farm.declare(app, remote);
+  declare_long_command(app);
+}
+
+Result<std::unique_ptr<Farm>> LongOptions::begin(const std::string& command, const std::string& out,
+                                                 std::vector<ProgressStage> stages,
+                                                 const FarmSettings& settings,
+                                                 CliContext& context) const {
+  LongCommand::begin_if_possible(command, keep.place(command, out), std::move(stages), context);
+  return start_recorded(farm, settings, context);
+}
+
+Result<std::unique_ptr<Farm>> LongOptions::begin_in(const std::string& command,
+                                                    const std::string& out,
+                                                    std::vector<ProgressStage> stages,
+                                                    const FarmSettings& settings,
+                                                    CliContext& context) const {
+  const KeepingPlace place{out, /*passing=*/false, /*forget=*/true};
+  RETURN_IF_ERROR(LongCommand::begin(command, place, std::move(stages), context));
+  return start_recorded(farm, settings, context);
 }
 
 void TracedCommands::declare(CLI::App& app) {

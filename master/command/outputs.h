@@ -9,6 +9,7 @@
 #include "common/config/settings.h"
 #include "common/trials/trial.h"
 #include "master/command/inputs.h"
+#include "master/command/long_command.h"
 #include "master/experiments/influence/influence.h"
 
 namespace gapfarm {
@@ -65,6 +66,26 @@ class Outputs {
   bool force_ = false;
   std::vector<std::string> inputs_;
   std::vector<Planned> planned_;
+};
+
+// What most long commands take: --force, workers, and where to keep what is simulated.
+struct LongOptions {
+  Outputs outputs;
+  FarmOptions farm;
+  KeepOption keep;
+
+  enum class Leaves { kFile, kFolder };  // a folder keeps by itself: without --keep
+  void declare(CLI::App& app, Leaves leaves, bool remote);
+
+  // The command's work begins (LongCommand), in keep's place: the farm that it asks.
+  Result<std::unique_ptr<Farm>> begin(const std::string& command, const std::string& out,
+                                      std::vector<ProgressStage> stages,
+                                      const FarmSettings& settings, CliContext& context) const;
+  // The same in the folder `out`, and what is simulated goes at the end: paths are large, and no
+  // figure refers to them.
+  Result<std::unique_ptr<Farm>> begin_in(const std::string& command, const std::string& out,
+                                         std::vector<ProgressStage> stages,
+                                         const FarmSettings& settings, CliContext& context) const;
 };
 
 struct TracedCommands {

@@ -286,9 +286,7 @@ SubcommandRun setup_export(CLI::App& app) {
   app.add_option("--trials", command->runs,
                  "runs: folders with commands.csv and poses.csv (default: those fitted to)");
   app.add_option("--out", command->out, "Folder to write to (default: all is printed)");
-  command->outputs.declare(app);
-  command->farm.declare(app, false);
-  declare_long_command(app);
+  command->declare(app, LongOptions::Leaves::kFolder, false);
   app.footer(
       "Examples:\n"
       "  gapfarm export ros run/husky\n"

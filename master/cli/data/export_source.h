@@ -18,7 +18,7 @@ namespace gapfarm {
 
 inline constexpr int kMostSamplesOut = 9999;
 
-struct ExportCommand {
+struct ExportCommand : LongOptions {
   std::string format;
   std::string source;
   std::string controllers;
@@ -27,8 +27,6 @@ struct ExportCommand {
   std::uint64_t seed = 1;
   std::vector<std::string> runs;
   std::string out;
-  Outputs outputs;
-  FarmOptions farm;
 };
 
 // A ground robot and the log that it is fitted to.

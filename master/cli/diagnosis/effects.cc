@@ -19,11 +19,9 @@
 namespace gapfarm {
 namespace {
 
-struct EffectsOptions {
+struct EffectsOptions : LongOptions {
   std::string config;
   std::string figures;
-  Outputs outputs;
-  FarmOptions farm;
 };
 
 // In figures each strength stands this far from neutral toward its upper bound; places stay where
@@ -283,9 +281,7 @@ SubcommandRun setup_effects(CLI::App& app) {
       "Whose catalogue, and the robot of the pictures; default: tracked robots, a nominal one");
   app.add_option("--figures", options->figures,
                  "Draw what each effect does to a robot's commands, as SVG, into this folder");
-  options->outputs.declare(app);
-  options->farm.declare(app, false);
-  declare_long_command(app);
+  options->declare(app, LongOptions::Leaves::kFolder, false);
   app.footer(
       "Examples:\n"
       "  gapfarm effects\n"

@@ -21,19 +21,15 @@ namespace {
 
 constexpr double kAlike = 0.9;  // |cosine| from which two effects count as alike
 
-struct PlanOptions {
+struct PlanOptions : LongOptions {
   std::string source;
   std::string out;
   std::string picture;
   std::string place;
-  std::string effects = "all";
   plan::PlanSettings settings;
   std::optional<unsigned> sessions, chain;
   std::vector<double> levels, durations;
   DriveOptions drive;  // of a ground robot
-  Outputs outputs;
-  FarmOptions farm;
-  KeepOption keep;
 };
 
 struct PlannedPlace {
@@ -81,15 +77,7 @@ Status apply_options(PlanOptions& options, Config& config) {
                     "--trials, or fewer --sessions or a shorter --chain",
                     options.settings.trials, s.chain, s.sessions)};
   }
-  std::string name;
-  for (const char c : options.effects + ",") {
-    if (c != ',') {
-      name += c;
-      continue;
-    }
-    if (!name.empty() && name != "all") options.settings.effects.push_back(name);
-    name.clear();
-  }
+  std::erase(options.settings.effects, "all");
   return {};
 }
 
@@ -152,9 +140,10 @@ Json table_json(const plan::DesignedPlan& plan) {
 
 Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& config,
                                   CliContext& context) {
-  LongCommand::begin_if_possible("plan", options.keep.place("plan", options.out),
-                                 {{"candidates", 10, 0}, {"what they show", 3, 0}}, context);
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
+  ASSIGN_OR_RETURN(
+      const auto asked,
+      options.begin("plan", options.out, {{"candidates", 10, 0}, {"what they show", 3, 0}},
+                    config.farm, context));
   return plan::design_plan(*asked, config, options.settings, context.work->hooks());
 }
 
@@ -218,7 +207,8 @@ SubcommandRun setup_plan(CLI::App& app) {
   app.add_option("--picture", options->picture, "SVG to write: the floor, and power by trials");
   app.add_option("--trials", options->settings.trials, "In all; rounded up to whole chains")
       ->check(CLI::Range(1, 5000));
-  app.add_option("--effects", options->effects, "Names with commas between, or all");
+  app.add_option("--effects", options->settings.effects, "Names with commas between, or all")
+      ->delimiter(',');
   app.add_option("--place", options->place, "Floor to stay on, round the start, m: 2x2");
   app.add_option("--sessions", options->sessions, "Sessions")->check(CLI::Range(1, 100));
   app.add_option("--chain", options->chain, "Trials before the robot is put down anew")
@@ -230,10 +220,7 @@ SubcommandRun setup_plan(CLI::App& app) {
       ->check(CLI::Range(2, 100));
   app.add_option("--seed", options->settings.seed, "Of the chains to choose from");
   options->drive.declare(app);
-  options->outputs.declare(app);
-  options->keep.declare(app);
-  options->farm.declare(app, false);
-  declare_long_command(app);
+  options->declare(app, LongOptions::Leaves::kFile, false);
   app.footer(
       "Examples:\n"
       "  gapfarm plan configs/srv1.toml --trials 120 --place 2x2 --out plan.csv\n"

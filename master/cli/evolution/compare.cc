@@ -22,15 +22,13 @@
 namespace gapfarm {
 namespace {
 
-struct CompareCommand {
+struct CompareCommand : LongOptions {
   std::vector<std::string> files;
   TrialOptions trials;
   std::string out;
   std::optional<unsigned> seeds;
   std::optional<std::uint64_t> first_seed, evaluations;
   std::optional<double> target;
-  Outputs outputs;
-  FarmOptions farm;
 };
 
 constexpr const char* kFiles[] = {"summary.csv", "runs.csv", "convergence.csv", "compare.html"};
@@ -233,9 +231,7 @@ SubcommandRun setup_compare(CLI::App& app) {
   app.add_option("--evaluations", command->evaluations, "Evaluations of each run")
       ->check(CLI::PositiveNumber);
   app.add_option("--target", command->target, "Fitness whose reaching counts as success");
-  command->outputs.declare(app);
-  command->farm.declare(app, true);
-  declare_long_command(app);
+  command->declare(app, LongOptions::Leaves::kFolder, true);
   app.footer(
       "Random search, constant-velocity motion and the config's own values are always among the\n"
       "baselines.\n\n"

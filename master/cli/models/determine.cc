@@ -19,13 +19,10 @@
 namespace gapfarm {
 namespace {
 
-struct DetermineCommand {
+struct DetermineCommand : LongOptions {
   std::string config, model, out;
   TrialOptions trials;
   DetermineSettings settings;
-  Outputs outputs;
-  FarmOptions farm;
-  KeepOption keep;
 };
 
 // The problem at the model's values, scored by likelihood whatever it was tuned by.
@@ -113,9 +110,8 @@ Result<int> run_determine(DetermineCommand& command, CliContext& context) {
         {{"out", command.out}, {"genes", genes}, {"trials", trials}}, command.farm, config.farm,
         context);
   }
-  LongCommand::begin_if_possible("determine", command.keep.place("determine", command.out),
-                                 {{"evaluate"}}, context);
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   command.begin("determine", command.out, {{"evaluate"}}, config.farm, context));
   ASSIGN_OR_RETURN(const auto report,
                    determine(problem, point, farm_likelihood(*asked, problem, config.seed),
                              settings, context.work->hooks()));
@@ -157,10 +153,7 @@ SubcommandRun setup_determine(CLI::App& app) {
                  "Share of its range that a determined parameter's 95 % interval may cover")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
-  command->outputs.declare(app);
-  command->keep.declare(app);
-  command->farm.declare(app, true);
-  declare_long_command(app);
+  command->declare(app, LongOptions::Leaves::kFile, true);
   app.footer(
       "The curvature of the log likelihood about the model says how far each parameter could be\n"
       "elsewhere, all others moving along.\n\n"

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kSpacing_m = 0.02;  // between points of paths that are compared
 
-struct DriveCommand {
+struct DriveCommand : LongOptions {
   std::string model;
   std::vector<std::string> commands, waypoints, mined;
   TrialOptions reading;
@@ -33,8 +33,6 @@ struct DriveCommand {
   unsigned targets = 0;  // of the log; 0: all
   double coverage = 0.9;
   DriveSettings settings;
-  Outputs outputs;
-  FarmOptions farm;
 };
 
 struct Task {
@@ -275,9 +273,8 @@ Result<int> run_drive(DriveCommand& command, CliContext& context) {
                          {{"out", command.out}, {"runs", command.runs}, {"simulations", tasks}},
                          command.farm, {}, context);
   }
-  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
-  RETURN_IF_ERROR(LongCommand::begin("drive", place, {{"drive", 1, tasks}}, context));
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, {}, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   command.begin_in("drive", command.out, {{"drive", 1, tasks}}, {}, context));
   context.work->stage(0);
   ASSIGN_OR_RETURN(const auto report,
                    Driving(command, task, problem, *asked, context.console).run());
@@ -318,9 +315,7 @@ SubcommandRun setup_drive(CLI::App& app) {
       ->check(CLI::Range(0.005, 1.0))
       ->capture_default_str();
   app.add_option("--out", command->out, "Folder for the tables and the page")->required();
-  command->outputs.declare(app);
-  command->farm.declare(app, true);
-  declare_long_command(app);
+  command->declare(app, LongOptions::Leaves::kFolder, true);
   app.footer(
       "Constant velocity, and with --mined the motion model mined from a log, drive the same "
       "list.\n"

@@ -16,14 +16,12 @@
 namespace gapfarm {
 namespace {
 
-struct HorizonsCommand {
+struct HorizonsCommand : LongOptions {
   std::string source;
   std::vector<std::string> runs;
   std::vector<double> horizons = {0.5, 2, 5, 0};
   std::string picture;
   std::string out;
-  Outputs outputs;
-  FarmOptions farm;
 };
 
 // Whole runs, before and after, as a picture.
@@ -86,9 +84,7 @@ SubcommandRun setup_horizons(CLI::App& app) {
   app.add_option("--picture", command->picture,
                  "Draw the runs: logged, as simulated before and after the fit (SVG)");
   app.add_option("--out", command->out, "Every window with its errors, m and rad (CSV)");
-  command->outputs.declare(app);
-  command->farm.declare(app, false);
-  declare_long_command(app);
+  command->declare(app, LongOptions::Leaves::kFolder, false);
   app.footer(
       "Beside the simulation stand the robot's own kinematics, fitted to the same windows by least "
       "squares,\nand constant velocity. A program of yours has the latter alone.\n\n"

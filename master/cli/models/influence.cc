@@ -15,14 +15,12 @@
 namespace gapfarm {
 namespace {
 
-struct InfluenceCommand {
+struct InfluenceCommand : LongOptions {
   std::string config;
   std::string out;
   std::string distance = "frechet";
   TracedCommands traced;
   InfluenceSettings settings;
-  Outputs outputs;
-  FarmOptions farm;
 };
 
 Json to_json(const InfluenceReport& report, const ParameterTable& table) {
@@ -61,10 +59,8 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
                          {{"out", command.out}, {"parameters", genes.size()}}, command.farm,
                          config.farm, context);
   }
-  // The paths are large, and no figure refers to them.
-  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
-  RETURN_IF_ERROR(LongCommand::begin("influence", place, {{"trace paths"}}, context));
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked, command.begin_in("influence", command.out, {{"trace paths"}},
+                                                      config.farm, context));
   ASSIGN_OR_RETURN(const auto report, find_influence(*asked, config.problem, genes,
                                                      command.settings, context.work->hooks()));
   RETURN_IF_ERROR(command.outputs.write_in(
@@ -107,9 +103,7 @@ SubcommandRun setup_influence(CLI::App& app) {
       ->check(CLI::Range(4, 100000))
       ->capture_default_str();
   command->traced.declare(app);
-  command->outputs.declare(app);
-  command->farm.declare(app, true);
-  declare_long_command(app);
+  command->declare(app, LongOptions::Leaves::kFolder, true);
   app.footer(
       "Examples:\n"
       "  gapfarm influence configs/racquetball.toml --out influence\n"

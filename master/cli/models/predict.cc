@@ -23,14 +23,11 @@
 namespace gapfarm {
 namespace {
 
-struct PredictOptions {
+struct PredictOptions : LongOptions {
   std::string model;
   std::vector<std::string> mined;
   TrialOptions trials;
   std::string out = "-";
-  Outputs outputs;
-  FarmOptions farm;
-  KeepOption keep;
 };
 
 // The log in parts that many workers can have and a stop does not lose; trials of one command stay
@@ -68,9 +65,8 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
   // Any fitness will do; this one asks nothing of the log.
   problem.fitness.kind = FitnessKind::kLogScore;
   const std::vector<v1::Task> tasks = predict_tasks(log);
-  LongCommand::begin_if_possible("predict", options.keep.place("predict", options.out),
-                                 {{"predict", 1, tasks.size()}}, context);
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, {}, context));
+  ASSIGN_OR_RETURN(const auto asked, options.begin("predict", options.out,
+                                                   {{"predict", 1, tasks.size()}}, {}, context));
   context.work->stage(0);
   ASSIGN_OR_RETURN(const auto results, asked->run(asked->add_problem(to_proto(problem)), tasks));
   v1::PredictResult whole;
@@ -195,10 +191,7 @@ SubcommandRun setup_predict(CLI::App& app) {
   app.add_option(
       "--mined", options->mined,
       "Predict by the motion model mined from these logs, P(M' | M, u), in place of a simulation");
-  options->outputs.declare(app);
-  options->keep.declare(app);
-  options->farm.declare(app, false);
-  declare_long_command(app);
+  options->declare(app, LongOptions::Leaves::kFile, false);
   app.footer(
       "Examples:\n"
       "  gapfarm predict run/demo --trials trials.csv --out predictions.csv\n"

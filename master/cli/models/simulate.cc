@@ -17,7 +17,7 @@
 namespace gapfarm {
 namespace {
 
-struct SimulateOptions {
+struct SimulateOptions : LongOptions {
   std::string source;
   std::string out;
   std::string like;
@@ -27,9 +27,6 @@ struct SimulateOptions {
   std::vector<double> levels, durations;
   std::vector<std::string> commands;
   std::optional<double> path_interval_s;
-  Outputs outputs;
-  FarmOptions farm;
-  KeepOption keep;
 };
 
 Status apply_options(const SimulateOptions& options, Config& config) {
@@ -94,9 +91,9 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Source& source, Cl
 Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, const Plan& plan,
                           CliContext& context) {
   const Config& config = source.config;
-  LongCommand::begin_if_possible("simulate", options.keep.place("simulate", options.out),
-                                 {{"drive sessions", 1, plan.size()}}, context);
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   options.begin("simulate", options.out, {{"drive sessions", 1, plan.size()}},
+                                 config.farm, context));
   context.work->stage(0);
   const std::string hash = asked->add_problem(to_proto(without_log(config.problem)));
   ASSIGN_OR_RETURN(
@@ -157,10 +154,7 @@ SubcommandRun setup_simulate(CLI::App& app) {
   app.add_option("--commands", options->commands, "Only these commands");
   app.add_option("--paths", options->path_interval_s, "s between samples of paths.csv; 0: none")
       ->check(CLI::Range(0.0, 10.0));
-  options->outputs.declare(app);
-  options->keep.declare(app);
-  options->farm.declare(app, false);
-  declare_long_command(app);
+  options->declare(app, LongOptions::Leaves::kFile, false);
   app.footer(
       "Examples:\n"
       "  gapfarm simulate configs/srv1.toml --out trials.csv --sessions 3 --trials 100\n"

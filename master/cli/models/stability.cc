@@ -16,13 +16,11 @@
 namespace gapfarm {
 namespace {
 
-struct StabilityCommand {
+struct StabilityCommand : LongOptions {
   std::string config;
   std::string out;
   TracedCommands traced;
   StabilitySettings settings;
-  Outputs outputs;
-  FarmOptions farm;
 };
 
 std::string spread_text(const std::optional<double>& spread) {
@@ -67,10 +65,8 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
         {{"out", command.out}, {"genes", genes}, {"repeats", command.settings.repeats}},
         command.farm, config.farm, context);
   }
-  // The paths are large, and no figure refers to them.
-  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
-  RETURN_IF_ERROR(LongCommand::begin("stability", place, {{"trace paths"}}, context));
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked, command.begin_in("stability", command.out, {{"trace paths"}},
+                                                      config.farm, context));
   ASSIGN_OR_RETURN(const auto report,
                    find_stability(*asked, config.problem, command.settings, context.work->hooks()));
   RETURN_IF_ERROR(write_all(command, config, report));
@@ -114,9 +110,7 @@ SubcommandRun setup_stability(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->traced.declare(app);
-  command->outputs.declare(app);
-  command->farm.declare(app, true);
-  declare_long_command(app);
+  command->declare(app, LongOptions::Leaves::kFolder, true);
   app.footer(
       "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "
       "the\n"
