@@ -26,15 +26,8 @@ std::string gene_range(const Gene& gene, const ParameterTable& table) {
 
 // The value without its unit, as TOML has it.
 std::string toml_value(const ParameterTable& table, std::size_t row, double value) {
-  const Parameter& parameter = table[row];
-  switch (parameter.kind) {
-    case ParameterKind::kChoice:
-      return "\"" + parameter.choices[static_cast<std::size_t>(value)] + "\"";
-    case ParameterKind::kBoolean:
-      return value != 0 ? "true" : "false";
-    default:
-      return fmt::format("{}", value);
-  }
+  const std::string text = table.text_of(row, value);
+  return table[row].kind == ParameterKind::kChoice ? '"' + text + '"' : text;
 }
 
 std::vector<ChartBar> bars_of(const InfluenceReport& report, const ParameterTable& table,
