@@ -13,7 +13,7 @@
 namespace gapfarm {
 
 // Two floors in one log: beyond an edge, or within a patch, a wheel travels less far, or farther
-// (common/score/floor_parts.h).
+// (common/score/kinematic_body.h).
 GroundHypothesis floor_edge();
 GroundHypothesis friction_patch();
 
