@@ -9,7 +9,6 @@
 #include "common/math/statistics.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/report/ground_text.h"
-#include "master/ground/stands.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

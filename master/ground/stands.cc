@@ -1,9 +1,8 @@
-#include "master/ground/stands.h"
-
 #include <algorithm>
 #include <utility>
 
 #include "master/ground/report/ground_text.h"
+#include "master/ground/search.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

@@ -1,7 +1,6 @@
 // Names that are not worth one beside those that came after them.
-#include "master/ground/stands.h"
-
 #include "common/base/ranges.h"
+#include "master/ground/search.h"
 #include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {
