@@ -11,7 +11,6 @@
 #include "common/progress/overall_progress.h"
 #include "common/robot/robot.h"
 #include "master/ground/reference.h"
-#include "master/ground/report/ground_report.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -59,6 +58,23 @@ Status exclude(const std::vector<std::string>& names, std::vector<GroundHypothes
     }
   }
   return {};
+}
+
+// What was chosen or is known, of report_ground()'s values; what lies before measured wheel speeds
+// is not the file's.
+Kinematics chosen_values(const GroundSearch& search, const std::vector<ReportedValue>& values) {
+  Kinematics at;
+  for (std::size_t j = 0; j < search.fit.rows.size(); ++j) {
+    const bool named = search.reference ? search.fit.rows[j].free : values[j].named;
+    if (named) at.add(values[j].name, values[j].reported);
+  }
+  if (search.reference) search.reference->complete(&at);
+  Kinematics kept;
+  for (std::size_t k = 0; k < at.names.size(); ++k) {
+    if (search.loop && (at.names[k] == "lag" || at.names[k] == "delay")) continue;
+    kept.add(at.names[k], at.values[static_cast<Eigen::Index>(k)]);
+  }
+  return kept;
 }
 
 // The file's robot, driven as `driven` is.

@@ -50,6 +50,10 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
 Result<GroundDiagnosis> diagnose_by(const GroundRobot& robot, const RunLog& log,
                                     const GroundDiagnoseOptions& options, GroundQuestion question);
 
+// From what a search found to what its diagnosis says (report/ground_report.cc).
+GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
+                              const GroundDiagnoseOptions& options);
+
 // What a log has the wrong way round or in another unit, in seconds, nothing fitted.
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log);
 

@@ -1,5 +1,3 @@
-#include "master/ground/report/ground_report.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
+#include "master/ground/diagnose_ground.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 
@@ -40,6 +39,9 @@ class GroundReport {
   void figures();
   void screening();
   void trials();
+  // What is beyond doubt, a warning of the log's too.
+  NamedEffect sure_effect(const std::string& name, const std::vector<std::string>& aliases,
+                          std::string text, const std::string& remedy);
   NamedEffect effect_of(const GroundStep& step, std::size_t place);
   void name_headline();
   void judge();
@@ -115,35 +117,39 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
 void GroundReport::faults() {
   for (const FoundFault& fault : search_.faults) {
     const GroundHypothesis& h = search_.catalogue[fault.hypothesis];
-    NamedEffect effect;
-    effect.name = h.name;
-    for (const std::string& alias : h.aliases) add_alias(alias, &effect);
-    effect.confidence = kAlmostSure;
+    const double gap = fault.gain / search_.windows.stretches();
+    NamedEffect effect = sure_effect(
+        h.name, h.aliases,
+        fmt::format("The log is wrong in {}: put right, what {} expects is {:.1f} times as near to "
+                    "what was measured.",
+                    h.thing, source_of(robot_), std::exp(gap / 3)),
+        h.remedy);
     effect.closed = effect.closed_hi = 1;
-    effect.gap_before = fault.gain / search_.windows.stretches();
-    const double shrinks = std::exp(effect.gap_before / 3);
-    effect.text = fmt::format(
-        "The log is wrong in {}: put right, what {} expects is {:.1f} times as near to what was "
-        "measured.",
-        h.thing, source_of(robot_), shrinks);
-    d_.sanity.push_back({h.name, effect.text, h.remedy, Severity::kNote, true, effect.aliases});
+    effect.gap_before = gap;
     effect.text += " " + h.remedy;
     d_.effects.push_back(std::move(effect));
   }
 }
 
+NamedEffect GroundReport::sure_effect(const std::string& name,
+                                      const std::vector<std::string>& aliases, std::string text,
+                                      const std::string& remedy) {
+  NamedEffect effect;
+  effect.name = name;
+  for (const std::string& alias : aliases) add_alias(alias, &effect);
+  effect.confidence = kAlmostSure;
+  effect.text = std::move(text);
+  d_.sanity.push_back({name, effect.text, remedy, Severity::kNote, true, effect.aliases});
+  return effect;
+}
+
 // What the poses show by themselves.
 void GroundReport::readings() {
   d_.sanity.insert(d_.sanity.end(), search_.jumps.findings.begin(), search_.jumps.findings.end());
-  const auto add = [&](const char* name, std::vector<std::string> aliases, Estimate estimate,
+  const auto add = [&](const char* name, const std::vector<std::string>& aliases, Estimate estimate,
                        std::string text, const char* remedy) {
-    NamedEffect effect;
-    effect.name = name;
-    effect.aliases = std::move(aliases);
-    effect.confidence = kAlmostSure;
+    NamedEffect effect = sure_effect(name, aliases, std::move(text), remedy);
     effect.parameters = {std::move(estimate)};
-    effect.text = std::move(text);
-    d_.sanity.push_back({name, effect.text, remedy, Severity::kNote, true, effect.aliases});
     // What was read is no answer to what changed.
     if (search_.reference) return;
     d_.effects.push_back(std::move(effect));
@@ -380,21 +386,6 @@ GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& sear
   result.diagnosis = report.write();
   result.figures = report.figures_of();
   return result;
-}
-
-Kinematics chosen_values(const GroundSearch& search, const std::vector<ReportedValue>& values) {
-  Kinematics at;
-  for (std::size_t j = 0; j < search.fit.rows.size(); ++j) {
-    const bool named = search.reference ? search.fit.rows[j].free : values[j].named;
-    if (named) at.add(values[j].name, values[j].reported);
-  }
-  if (search.reference) search.reference->complete(&at);
-  Kinematics kept;
-  for (std::size_t k = 0; k < at.names.size(); ++k) {
-    if (search.loop && (at.names[k] == "lag" || at.names[k] == "delay")) continue;
-    kept.add(at.names[k], at.values[static_cast<Eigen::Index>(k)]);
-  }
-  return kept;
 }
 
 }  // namespace gapfarm
