@@ -76,9 +76,9 @@ TEST(ModelResidual, MistakesAreNamedWithTheirPlace) {
   EXPECT_THAT(message("covariates = [\"heading\"]", "covariates = [\"headin\"]"),
               HasSubstr("heading"));
   EXPECT_THAT(message("lengths = [0.7]", "lengths = [-0.7]"), HasSubstr("-0.7"));
-  EXPECT_THAT(message("centres = [[-2]", "centres = [[-2, 1]"),
+  EXPECT_THAT(message("centres = [[-2.0]", "centres = [[-2.0, 1]"),
               HasSubstr("centres are rows of 1 finite numbers"));
-  EXPECT_THAT(message("centres = [[-2]", "centres = [[nan]"),
+  EXPECT_THAT(message("centres = [[-2.0]", "centres = [[nan]"),
               HasSubstr("centres are rows of 1 finite numbers"));
   EXPECT_THAT(message("turn_cw = [", "turn_up = ["), HasSubstr("turn_up"));
   EXPECT_THAT(message("by_drive = true", "by_drve = true"), HasSubstr("by_drve"));
