@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/progress/number_text.h"
+#include "common/base/text.h"
 #include "common/trials/files.h"
 #include "master/cli/evolution/evolution.h"
 #include "master/cli/evolution/search_start.h"
