@@ -89,7 +89,9 @@ Predictor::Predictor(Farm& farm, const Problem& problem)
 
 Predictor::Condition Predictor::condition(std::uint32_t trial) const {
   const Trial& t = problem_.log.trials[trial];
-  return {t.command, t.left, t.right, t.duration_s};
+  // Windows are parts of one run, which is simulated through.
+  if (t.run) return {*t.run, "", {}, {}, {}};
+  return {0, t.command, t.left, t.right, t.duration_s};
 }
 
 std::vector<std::vector<std::uint32_t>> Predictor::parts_of(const PredictionRequest& request,
@@ -109,8 +111,8 @@ std::vector<std::vector<std::uint32_t>> Predictor::parts_of(const PredictionRequ
   std::size_t from = 0;
   for (std::size_t p = 1; p <= parts; ++p) {
     std::size_t to = p * trials.size() / parts;
-    // A condition in two tasks may have to be simulated twice.
-    if (p < parts && begins.size() >= 2 * parts) {
+    // A condition in two tasks may have to be simulated twice, and a run has to be.
+    if (p < parts && (begins.size() >= 2 * parts || problem_.windows())) {
       to = *std::lower_bound(begins.begin(), begins.end() - 1, to);
     }
     if (to <= from) continue;

@@ -61,8 +61,8 @@ class Predictor {
 
  private:
   // Trials of one share a simulation, unless their places matter.
-  using Condition =
-      std::tuple<std::string, std::optional<double>, std::optional<double>, std::optional<double>>;
+  using Condition = std::tuple<std::uint32_t, std::string, std::optional<double>,
+                               std::optional<double>, std::optional<double>>;
   Condition condition(std::uint32_t trial) const;
   std::vector<std::vector<std::uint32_t>> parts_of(const PredictionRequest& request,
                                                    std::size_t parts) const;

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "common/parameters/table.h"
 #include "common/score/kinematic.h"
+#include "master/infer/predictor.h"
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/worker/ground_problem.h"
 
@@ -22,6 +25,27 @@ double found_value(const Problem& problem, const SimulatedStart& start, const st
   ParameterValues values = problem.values;
   decode(problem.table(), problem.genes, start.genome, values);
   return values[problem.table().row(key)];
+}
+
+// Whoever simulates a run's last window has simulated the others.
+TEST(Predictor, GivesEachRunToOneTask) {
+  Problem problem = tests::ground_problem();
+  const ParameterValues own = problem.values;
+  tests::take_runs(problem,
+                   {tests::driven_run(problem, own, 12), tests::driven_run(problem, own, 9),
+                    tests::driven_run(problem, own, 12)},
+                   {{0.5, 2}, 0.5});
+  tests::WorkerFarm farm;
+  const std::vector<v1::Task> tasks = Predictor(farm, problem).tasks({});
+  std::map<std::uint32_t, std::set<std::size_t>> by_run;
+  int windows = 0;
+  for (std::size_t t = 0; t < tasks.size(); ++t) {
+    for (const auto i : tasks[t].predict().trials()) by_run[*problem.log.trials[i].run].insert(t);
+    windows += tasks[t].predict().trials_size();
+  }
+  EXPECT_EQ(windows, std::ssize(problem.log.trials));
+  ASSERT_EQ(by_run.size(), 3U);
+  for (const auto& [run, of] : by_run) EXPECT_EQ(of.size(), 1U) << "run " << run;
 }
 
 TEST(SimulatedStart, FindsWhatKinematicsHaveNoWordFor) {
