@@ -13,6 +13,9 @@
 namespace gapfarm {
 namespace {
 
+// No more: a base alone that is left to settle takes up what an effect does (of a log of another
+// physics with one of 6 % too much to name it).
+constexpr int kTuningRounds = 6;
 constexpr double kGainStep = 0.02;
 constexpr double kSameSlope = 0.05;   // relative: a parameter that moves the ends as the gain does
 constexpr double kLeastAhead = 0.05;  // mean duty of a drive that does
@@ -140,7 +143,7 @@ Status fit_base(Predictor& predictor, Study* study) {
     const bool some = omit_far_turns(round, &seen);
     ASSIGN_OR_RETURN(const auto fit,
                      fit_jointly(predictor, seen, {}, study->base, BaseParameters::kFitted,
-                                 misfit_columns(seen), some ? 2 : infer::kLongSearch));
+                                 misfit_columns(seen), some ? 2 : kTuningRounds));
     for (const BaseParameter& p : study->drive.tuned) {
       const auto [lower, upper] = tunable((*study->table)[p.row]);
       study->base[p.row] = std::clamp(fit.at.at(p.row), lower, upper);
