@@ -11,6 +11,7 @@
 #include "common/base/text.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
+#include "master/ground/diagnose_ground.h"
 #include "master/io/log_checks/log_checks.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"
@@ -243,10 +244,23 @@ void show_notes(const TrialLog& log, Console& console) {
   console.note(text);
 }
 
-void show_warnings(const Problem& problem, Console& console) {
-  if (problem.ground || problem.windows()) return;
+std::vector<SanityFinding> log_warnings(const Problem& problem,
+                                        const std::vector<std::string>& runs,
+                                        std::vector<std::size_t>* impossible) {
+  if (problem.ground) {
+    const GroundRobot robot = problem.ground->robot_at(problem.values);
+    const auto log = read_run_folders(runs, robot.channels);
+    return log ? check_ground_log(robot, *log) : std::vector<SanityFinding>();
+  }
+  if (!problem.windows()) return check_sanity(problem, impossible);
+  std::vector<SanityFinding> findings;
+  check_count(problem.log, &findings);
+  return findings;
+}
+
+void show_warnings(const Problem& problem, const std::vector<std::string>& runs, Console& console) {
   std::vector<std::size_t> impossible;
-  for (const SanityFinding& f : check_sanity(problem, &impossible)) {
+  for (const SanityFinding& f : log_warnings(problem, runs, &impossible)) {
     // Few trials are enough to tune by; notes count where they are about rows.
     if (f.name == "too_few_trials" || (f.severity == Severity::kNote && impossible.empty()))
       continue;

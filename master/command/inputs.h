@@ -18,6 +18,7 @@
 #include "common/trials/read.h"
 #include "master/command/console.h"
 #include "master/farm/socket_farm.h"
+#include "master/io/log_checks/log_checks.h"
 #include "master/run/stored_run.h"
 
 namespace gapfarm {
@@ -65,8 +66,13 @@ struct TrialOptions {
 // What the readers omitted from a log and which files they read, to stderr.
 void show_notes(const TrialLog& log, Console& console);
 
-// The warnings of `check` about the log, a note each, except that its trials are few.
-void show_warnings(const Problem& problem, Console& console);
+// The warnings of `check` about a log; of a ground robot's, whose folders are `runs`, what is the
+// wrong way round.  `impossible`: check_sanity()'s.
+std::vector<SanityFinding> log_warnings(const Problem& problem,
+                                        const std::vector<std::string>& runs,
+                                        std::vector<std::size_t>* impossible = nullptr);
+// The same, a note each, except that its trials are few.
+void show_warnings(const Problem& problem, const std::vector<std::string>& runs, Console& console);
 
 std::size_t count_sessions(const TrialLog& log);
 

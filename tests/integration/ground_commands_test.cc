@@ -135,6 +135,16 @@ TEST_F(GroundCommands, CheckFindsTimesInMilliseconds) {
                     HasSubstr("Write times in s"), Not(HasSubstr("failed"))));
 }
 
+TEST_F(GroundCommands, EvolveWarnsOfTimesInMilliseconds) {
+  write_runs("slow", {0.2}, 1e3);
+  const auto planned = [&](const std::string& log) {
+    return gapfarm_command({"evolve", config("[genes]\ndelay = \"table\"\n"), "--trials",
+                            folder_ / log, "--out", folder_ / "run", "--dry-run"});
+  };
+  EXPECT_THAT(planned("slow").err, HasSubstr("Write times in s"));
+  EXPECT_THAT(planned("monday").err, Not(HasSubstr("Write times in s")));
+}
+
 // Multipliers of one robot's file were merged into the controller of another.
 TEST_F(GroundCommands, ExportRefusesAControllerOfAnotherRobot) {
   const auto exported = [&](const std::string& multiplier) {

@@ -18,7 +18,6 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
-#include "master/ground/diagnose_ground.h"
 #include "master/ground/program_runs.h"
 #include "master/io/log_checks/log_checks.h"
 #include "master/run/run.h"
@@ -163,20 +162,6 @@ std::size_t count_conditions(const Problem& problem, unsigned context) {
   return conditions.size();
 }
 
-// What is the wrong way round in a ground robot's runs.
-std::vector<SanityFinding> warnings(const Config& config) {
-  const Problem& problem = config.problem;
-  if (!problem.ground) {
-    if (!problem.windows()) return check_sanity(problem);
-    std::vector<SanityFinding> findings;
-    check_count(problem.log, &findings);
-    return findings;
-  }
-  const GroundRobot robot = problem.ground->robot_at(problem.values);
-  const auto runs = read_run_folders(config.trial_files, robot.channels);
-  return runs ? check_ground_log(robot, *runs) : std::vector<SanityFinding>();
-}
-
 Summary summarise(const Config& config) {
   const Problem& problem = config.problem;
   Summary summary;
@@ -191,7 +176,7 @@ Summary summarise(const Config& config) {
   }
   if (is_value(problem.fitness.kind)) return summary;
   summary.conditions = count_conditions(problem, context);
-  summary.sanity = warnings(config);
+  summary.sanity = log_warnings(problem, config.trial_files);
   return summary;
 }
 

@@ -72,7 +72,7 @@ Result<int> run_evolve(EvolveCommand command, CliContext& context) {
         RETURN_IF_ERROR(check_farm(command.options.farm, read.farm));
         return check_folder(command.out, FolderKind::kRun);
       }));
-  show_warnings(config.problem, context.console);
+  show_warnings(config.problem, config.trial_files, context.console);
   if (context.dry_run) return print_plan(command, config, context);
   context.console.note(command.out + ": evolving " + what_evolves(config.problem) + ", seed " +
                        std::to_string(config.seed));

@@ -140,7 +140,7 @@ Result<int> run_crossfit(const CrossfitOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(const auto config,
                    open_config(options.config, options.trials, context.console,
                                [&](Config& read) { return apply(options, read); }));
-  show_warnings(config.problem, context.console);
+  show_warnings(config.problem, config.trial_files, context.console);
   CrossfitPlan plan = plan_of(options, config);
   RETURN_IF_ERROR(check_crossfit(config.problem, plan));
   if (context.dry_run) return print_fits(options, config, context);

@@ -150,7 +150,7 @@ Result<int> run_predict(PredictOptions& options, CliContext& context) {
       const TrialLog log,
       read_trial_files(options.trials.files, command_names(model.commands), options.trials.read));
   show_notes(log, console);
-  if (options.mined.empty()) show_warnings(problem_with(model, log), console);
+  if (options.mined.empty()) show_warnings(problem_with(model, log), {}, console);
   options.outputs.reads(log);
   options.outputs.reads(options.model);
   options.outputs.reads((std::filesystem::path(options.model) / "model.toml").string());
