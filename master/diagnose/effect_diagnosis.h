@@ -56,14 +56,6 @@ struct Polar {
   bool ratio;       // the strength is the logarithm of a ratio
 };
 
-// Effects whose difference is small beside what one contact model and another make of them: of
-// these a second one must gain this share of what the first did.
-struct EffectFamily {
-  double share;
-};
-inline constexpr EffectFamily kReachFamily{0.75};  // how far every command drives
-inline constexpr EffectFamily kSlopeFamily{0.15};  // what pulls one way on all the floor
-
 struct WorldPlace {
   const char* key;
   int axis;  // 0: x, 1: y, -1: what the effect's `axis` says
@@ -115,7 +107,6 @@ struct EffectDiagnosis {
   bool bends_view = false;
 
   // Alternatives, whatever the log.
-  const EffectFamily* family = nullptr;
   std::vector<const char*> aliases = {};
 
   // Where a fit begins.  Neither: the coefficients are what its parameters are above neutral.

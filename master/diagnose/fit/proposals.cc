@@ -11,17 +11,9 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
-constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
-
 // A second one of a kind, for an error of the first's place or bend looks like one: of all that is
 // explained.
 constexpr double kSecondOfAKindShare = 0.05;
-
-double cosine(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-  const double lengths = a.norm() * b.norm();
-  return lengths > 0 ? a.dot(b) / lengths : 0;
-}
 
 }  // namespace
 
@@ -118,29 +110,6 @@ Regression Proposals::with(const std::vector<Signature>& first,
     if (k != but) r.add(chosen[k].signature.columns);
   }
   return r;
-}
-
-bool Proposals::is_new(const std::vector<Signature>& first,
-                       const std::vector<EffectCandidate>& chosen, const EffectCandidate& candidate,
-                       double explained) const {
-  const EffectDiagnoses& effects = *study_->subject->effects;
-  const EffectFamily* family = effects.row(candidate.effect()).family;
-  if (family != nullptr) {
-    double gained = 0;
-    for (const EffectCandidate& c : chosen) {
-      if (effects.row(c.effect()).family == family) gained += c.gain;
-    }
-    if (candidate.gain < family->share * gained) return false;
-  }
-  if (candidate.gain > kSecondShare * explained) return true;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const Regression r = with(first, chosen, i);
-    if (cosine(r.explained(chosen[i].signature.columns), r.explained(candidate.signature.columns)) >
-        kSecondAlias) {
-      return false;
-    }
-  }
-  return true;
 }
 
 }  // namespace gapfarm

@@ -70,11 +70,6 @@ class Proposals {
   // The best signature of one effect, which may have been chosen once already: a second seam.
   Result<EffectCandidate> again(const Regression& explained, const std::string& effect) const;
 
-  // Whether a candidate is no echo of what is chosen: an effect of the same family, or one with
-  // nearly the same mark, that gains little beside it.
-  bool is_new(const std::vector<Signature>& first, const std::vector<EffectCandidate>& chosen,
-              const EffectCandidate& candidate, double explained) const;
-
   // Data that are as if the predictions of what was chosen were linear in its columns.
   void restart(const Eigen::VectorXd& data) { base_.restart(data); }
   const Regression& nothing_explained() const { return base_; }

@@ -165,7 +165,6 @@ class Selection {
       const double most = infer::kMostTrust * mark.gain;
       if (most < least_gain_of(mark.effect(), study_, this->explained())) continue;
       if (not_these_.count(mark.effect())) continue;
-      if (!marks_->is_new(first_, chosen, mark, this->explained())) continue;
       best = std::max(best, mark.gain);
       hypotheses.push_back(competition_.of_mark(mark, explained));
     }

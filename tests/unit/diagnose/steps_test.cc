@@ -242,17 +242,6 @@ TEST(Proposals, AreTheBestOfEachEffectBestFirst) {
   EXPECT_EQ(s.best({"motor_asymmetry"}).size(), 1u);
 }
 
-TEST(Proposals, AnEchoOfWhatIsChosenIsNotNew) {
-  const Eigen::VectorXd a = column(20, even), b = column(20, odd);
-  Proposing s({}, 3 * a + b);
-  const std::vector<EffectCandidate> chosen = {{45, signature_of("motor_asymmetry", a)}};
-  const EffectCandidate echo = {10, signature_of("heading_offset", a + 0.2 * b)};
-  const EffectCandidate other = {10, signature_of("heading_offset", b)};
-  EXPECT_FALSE(s.proposals.is_new({}, chosen, echo, 45));
-  EXPECT_TRUE(s.proposals.is_new({}, chosen, other, 45));
-  EXPECT_TRUE(s.proposals.is_new({}, chosen, echo, 39)) << "a quarter of all is no echo";
-}
-
 TEST(Signatures, OfKindsOfDriveAddUpToTheWhole) {
   Study study = plain_study(6);
   study.cells.push_back({{"turn_ccw", -1, 1, 1}, MotionKind::kTurn, 1, 1, 1, 3});
