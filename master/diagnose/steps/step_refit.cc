@@ -95,11 +95,12 @@ Result<JointFit> estimate_beside(const DiagnosisRequest& of, const Explanation& 
 
 // Where more is left than a name allows, what the catalogue does explain is named as no cause; the
 // model that is written has it all the same when held-out trials are clearly better predicted
-// so.
+// so, and no correction without a cause can stand there, which predicts better.
 Result<Refit> with_correction(const DiagnosisRequest& of, Refit refit,
                               const std::vector<std::size_t>& folds) {
   const Explanation& named = refit.judged.named;
   if (refit.judged.unnamed.empty() || of.options.keep_base) return refit;
+  if (scenario_form(of.problem.scenario).residual) return refit;
   const std::vector<EffectCandidate>& effects = refit.judged.unnamed;
   const Study& study = named.study();
   Overrides start = study.base;

@@ -75,9 +75,8 @@ std::string residual_sentence(const FoundResidual& found) {
          ". model.toml has it as [residual].";
 }
 
-// A correction beside one of the nested fits, with scores on trials that neither saw.
+// A correction beside the last of the nested fits, with scores on trials that neither saw.
 struct TriedShape {
-  std::size_t nested = 0;
   Residual residual;  // empty: none helps
   std::vector<double> without_it, with_it;
   NoiseEstimate noise;  // of predictions beside it
@@ -116,10 +115,10 @@ OutlierLesson lesson_about(const ResidualData& data, const JointFit& reported_fi
   return lesson;
 }
 
-TriedShape try_shape(const DiagnosisRequest& of, const Refit& refit, std::size_t k) {
-  const JointFit& last = refit.nested[k].fit;
+TriedShape try_shape(const DiagnosisRequest& of, const Refit& refit) {
+  const JointFit& last = refit.nested.back().fit;
   const JointFit& reported_fit = refit.final_fit ? *refit.final_fit : last;
-  const Study& study = refit.nested[k].study;
+  const Study& study = refit.nested.back().study;
   const std::vector<std::size_t> folds = residual_folds(study);
   ResidualData data{logged_motions(of.problem),
                     reported_fit.ends,
@@ -132,7 +131,6 @@ TriedShape try_shape(const DiagnosisRequest& of, const Refit& refit, std::size_t
     return left_without(study, last, folds, fold);
   });
   TriedShape tried;
-  tried.nested = k;
   tried.residual.field = fit.field;
   const double share = of.outlier_share();
   const std::vector<Eigen::Vector3d> before = held_out_residuals(study, last, folds);
@@ -158,17 +156,6 @@ TriedShape with_outliers(const DiagnosisRequest& of, const Refit& refit, TriedSh
   return tried;
 }
 
-// Of a correction by effects that are no cause, the smooth one takes the place unless both together
-// predict clearly better.
-TriedShape best_shape(const DiagnosisRequest& of, const Refit& refit) {
-  TriedShape tried = try_shape(of, refit, refit.nested.size() - 1);
-  if (refit.correction.empty()) return tried;
-  TriedShape alone = try_shape(of, refit, refit.nested.size() - 2);
-  const bool better = !alone.residual.empty() &&
-                      (tried.residual.empty() || !clearly_better(tried.with_it, alone.with_it));
-  return better ? alone : tried;
-}
-
 }  // namespace
 
 Refit add_shape(const DiagnosisRequest& of, const Refit& refit) {
@@ -181,7 +168,7 @@ Refit add_shape(const DiagnosisRequest& of, const Refit& refit) {
   if (!unexplained || !possible) return with;
   FoundResidual& found = with.shape.emplace();
   found.text = residual_sentence(found);
-  const TriedShape tried = with_outliers(of, refit, best_shape(of, refit));
+  const TriedShape tried = with_outliers(of, refit, try_shape(of, refit));
   if (tried.residual.empty() || !clearly_better(tried.with_it, refit.nested.back().scores))
     return with;
   const auto n = static_cast<double>(tried.with_it.size());
@@ -194,11 +181,6 @@ Refit add_shape(const DiagnosisRequest& of, const Refit& refit) {
   if (!(gained - half > 0 && closed.lo > 0)) {
     with.floor = refit.floor;
     return with;
-  }
-  if (tried.nested + 1 < with.nested.size()) {
-    with.nested.pop_back();
-    std::erase(with.judged.cautions, with.correction);
-    with.correction.clear();
   }
   found = {{in_world(tried.residual.field, of.frame_m), tried.residual.outliers},
            gained,
