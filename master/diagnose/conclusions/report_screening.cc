@@ -68,14 +68,8 @@ void set_spreads(const DiagnosisRequest& of, const Refit& refit, Overrides* at) 
     for (const Estimate& e : found.fit.estimates) {
       (*at)[of.table().row(found.effect + "." + e.key)] = e.value;
     }
-  }
-  if (named.spread("slip_events") != nullptr) {
-    noise.drive_common = named.slip.noise.drive_common;
-    noise.drive_side = named.slip.noise.drive_side;
-    // Without events in it the fitted speed has made up for those that were not omitted.
-    if (const auto& speed = named.study().drive.speed) {
-      (*at)[*speed] /= 1 - mean_loss_of_slips(named);
-    }
+    const auto write = found.row != nullptr ? found.row->write : nullptr;
+    if (write != nullptr) write(named.study(), found.fit, &noise, at);
   }
   set_noise(of, noise, at);
 }

@@ -148,17 +148,6 @@ extern const EffectDiagnosis kMarkerOffset = {
                 "The marker is not over the turning centre"},
 };
 
-// Looked for in the tails of what is left (slip.h).
-extern const EffectDiagnosis kSlipEvents = {
-    .effect = "slip_events",
-    .phrases = {"In %1 of the trials a side slips and loses up to %2 of its speed",
-                {{"probability", 100, " %"}, {"loss", 100, " %"}},
-                "Clean the treads and the floor",
-                "In %1 of the drives a side slips"},
-    .found = "by the tails of what is left",
-    .missing = "single drives are no outliers as slips would make them",
-};
-
 // Looked for in readings that the next ones contradict (latency.h).
 extern const EffectDiagnosis kPoseLatency = {
     .effect = "pose_latency",

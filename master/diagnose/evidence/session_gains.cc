@@ -15,7 +15,6 @@ namespace gapfarm {
 namespace {
 
 constexpr std::size_t kFewestTrials = 10;  // of a session that shows anything
-constexpr double kFarFromSession = 11.5;   // squared distance with 3 degrees of freedom: one in 110
 constexpr double kLeastSpread = 0.004, kMostSpread = 0.3, kSpreadStep = 1.08;
 constexpr int kReweightings = 3;
 
@@ -100,8 +99,7 @@ std::vector<double> weights_at(const Study& study, const Eigen::MatrixXd& common
     const auto row = static_cast<Eigen::Index>(3 * i);
     const double gain = at.gain[study.trials[i].session];
     const double squared = (left.segment<3>(row) - gain * gains.segment<3>(row)).squaredNorm();
-    weight.push_back(study.ignores(i) ? 0
-                                      : std::min(1.0, kFarFromSession / std::max(squared, 1e-12)));
+    weight.push_back(study.ignores(i) ? 0 : std::min(1.0, kFarSquared / std::max(squared, 1e-12)));
   }
   return weight;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,14 +12,19 @@
 namespace gapfarm {
 
 // An effect that widens the distribution of trials rather than moves its mean, as a row: how it is
-// looked for.  It is looked for before the effects on the mean, which do without what it does to
-// trials, and named when trials that no fit saw are clearly predicted better with it.
+// looked for.  Effects on the mean do without what it does to trials, and it is named when trials
+// that no fit saw are clearly predicted better with it.
+
+// Squared distance with 3 degrees of freedom beyond which a trial is an outlier: one in 110.
+inline constexpr double kFarSquared = 11.5;
 
 struct SpreadFit {
   double gain = 0;  // nats over all trials
   std::vector<Estimate>
       estimates;  // of the effect's parameters, the first the one that is reported
-  std::vector<SessionGain> sessions = {};  // of all sessions, of an effect that has one in each
+  std::vector<SessionGain> sessions = {};   // of all sessions, of an effect that has one in each
+  std::optional<NoiseEstimate> noise = {};  // beside it, where that was fitted, too
+  std::string odd = {};  // why there is something, but not this; empty: it may be this
 };
 
 struct SpreadRow {
@@ -31,6 +37,11 @@ struct SpreadRow {
                                 const SpreadFit& fit, double outlier_share);
   // Whether it may be one that the effect strikes; null: it strikes no single ones.
   bool (*contaminates)(const ResidualTrial& trial) = nullptr;
+  // Any miss of the mean would pass for it: it is looked for when the mean is explained.
+  bool after_means = false;
+  // What the base and the noise of a model are beside it; null: as without.
+  void (*write)(const Study& study, const SpreadFit& fit, NoiseEstimate* noise,
+                Overrides* base) = nullptr;
   // Each session has a gain of its own, which no statement about means may use, rather
   // than trials that show nothing of means.
   bool by_session = false;

@@ -65,15 +65,6 @@ std::vector<NestedFit> with_tails(const DiagnosisRequest& of, const Tails& tails
   return nested;
 }
 
-std::vector<double> scores_with_slips(const DiagnosisRequest& of, const Explanation& named,
-                                      const NestedFit& last,
-                                      const std::vector<std::size_t>& folds) {
-  return mapped(
-      trials_with_slips(named.study().trials, held_out_residuals(last.study, last.fit, folds),
-                        named.slip, mean_loss_of_slips(named), of.outlier_share()),
-      &SlipTrial::score);
-}
-
 Judgement with_other_outliers(Judgement judged, const std::string& effect,
                               const char* what = "Single drives are outliers") {
   const bool named = judged.named.names_anything();
@@ -83,34 +74,27 @@ Judgement with_other_outliers(Judgement judged, const std::string& effect,
   return judged;
 }
 
-// They explain the scatter less well than a wider noise does: something else makes drives outliers.
-Judgement without_slips(Judgement judged) {
-  judged.named.drop_spread("slip_events");
-  return with_other_outliers(std::move(judged), "slips");
-}
-
 // The last of the nested fits, and each effect on the spread foreseen; it is named for that alone.
 Judgement with_spreads_foreseen(const DiagnosisRequest& of, Judgement judged, const NestedFit& last,
                                 const std::vector<std::size_t>& folds) {
   std::vector<FoundSpread>& spreads = judged.named.spreads;
   const double share = of.outlier_share();
   const std::vector<Eigen::Vector3d> residuals = held_out_residuals(last.study, last.fit, folds);
-  for (FoundSpread& found : spreads) {
-    if (found.row == nullptr) continue;
+  const SpreadRow* worthless = nullptr;
+  std::erase_if(spreads, [&](FoundSpread& found) {
+    if (found.row == nullptr) return false;
     // What else was named was not yet explained when it was found.
     // Held out, a session follows the others' mean as well.
-    SpreadFit beside =
-        found.row->fit(last.study, found.row->by_session ? last.fit.residuals : residuals, share);
-    if (beside.gain >= found.row->least_gain) found.fit = std::move(beside);
+    if (!found.row->after_means) {
+      SpreadFit beside =
+          found.row->fit(last.study, found.row->by_session ? last.fit.residuals : residuals, share);
+      if (beside.gain >= found.row->least_gain) found.fit = std::move(beside);
+    }
     found.scores = found.row->scores(last.study, residuals, found.fit, share);
-  }
-  const SpreadRow* worthless = nullptr;
-  std::erase_if(spreads, [&](const FoundSpread& found) {
-    if (found.row == nullptr) return false;
     // Where few trials are struck it is what each gains that shows, not how many do.
     const double gained =
         (mean(found.scores) - mean(last.scores)) * static_cast<double>(found.scores.size());
-    if (gained >= found.row->least_gain) return false;
+    if (!found.row->after_means && gained >= found.row->least_gain) return false;
     if (clearly_better(found.scores, last.scores)) return false;
     worthless = found.row;
     return true;
@@ -119,6 +103,13 @@ Judgement with_spreads_foreseen(const DiagnosisRequest& of, Judgement judged, co
   return with_other_outliers(
       std::move(judged), worthless->effect,
       worthless->by_session ? "Sessions drive at other speeds" : "Single drives are outliers");
+}
+
+// Tails and what makes single drives outliers explain the same: null where that is not named.
+const FoundSpread* instead_of_tails(const Explanation& named) {
+  const auto found = std::ranges::find_if(
+      named.spreads, [](const FoundSpread& s) { return s.row != nullptr && s.row->after_means; });
+  return found == named.spreads.end() ? nullptr : &*found;
 }
 
 // Not worse than what was reached on trials that the fit did not see, and there is more to be had
@@ -138,51 +129,27 @@ double within_reach(const DiagnosisRequest& of, const Refit& refit) {
 
 }  // namespace
 
-// An event's loss is uniform below the greatest; the excluded trials are taken for the worst of
-// those with an event on either side.
-double mean_loss_of_slips(const Explanation& named) {
-  const SlipFit& slip = named.slip;
-  const std::vector<bool>& ignored = named.study().ignored;
-  const double either = slip.probability * (2 - slip.probability);
-  const double excluded = static_cast<double>(std::count(ignored.begin(), ignored.end(), true));
-  const double most =
-      1 -
-      std::min(1.0, excluded / std::max(1.0, either * static_cast<double>(named.study().size())));
-  return std::clamp(slip.probability * most * slip.loss * most / 2, 0.0, 0.5);
-}
-
 Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std::size_t>& folds) {
   Judgement& judged = refit.judged;
-  std::vector<double> with_slips;
-  const auto slips = [&] { return judged.named.spread("slip_events") != nullptr; };
-  if (slips()) {
-    with_slips = scores_with_slips(of, judged.named, refit.nested.back(), folds);
-    if (!clearly_better(with_slips, refit.nested.back().scores)) {
-      judged = without_slips(std::move(judged));
-    }
-  }
+  const Judgement before = judged;
+  judged = with_spreads_foreseen(of, before, refit.nested.back(), folds);
   std::optional<Tails> tails = tails_of(of, *judged.named.evidence, refit.nested);
   if (tails) {
     auto tailed = with_tails(of, *tails, refit.nested, folds);
-    // Whatever else makes single drives outliers has heavy tails, which explain it better than
-    // slips.
-    if (slips() && !(mean(tailed.back().scores) > mean(with_slips))) {
+    const FoundSpread* outliers = instead_of_tails(judged.named);
+    if (outliers != nullptr && !(mean(tailed.back().scores) > mean(outliers->scores))) {
       tails.reset();
     } else {
-      if (slips()) judged = without_slips(std::move(judged));
       refit.nested = std::move(tailed);
+      judged = with_spreads_foreseen(of, before, refit.nested.back(), folds);
     }
   }
-  const NestedFit& last = refit.nested.back();
-  judged = with_spreads_foreseen(of, std::move(judged), last, folds);
-  // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
-  refit.floor = slips() ? mean(with_slips)
-                : tails ? tails->perfect
-                        : floor_score(last.study, of.outlier_share());
+  // What outliers scatter is no Gaussian: the best prediction is the mixture fitted to it.
+  const FoundSpread* outliers = instead_of_tails(judged.named);
+  refit.floor = outliers != nullptr ? mean(outliers->scores)
+                : tails             ? tails->perfect
+                                    : floor_score(refit.nested.back().study, of.outlier_share());
   refit.floor = std::max(refit.floor, within_reach(of, refit));
-  for (FoundSpread& found : judged.named.spreads) {
-    if (found.effect == "slip_events") found.scores = with_slips;
-  }
   return refit;
 }
 

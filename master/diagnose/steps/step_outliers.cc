@@ -9,49 +9,29 @@
 #include "common/score/motion_model.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/evidence/noise.h"
-#include "master/diagnose/evidence/slip.h"
 #include "master/diagnose/steps/step_parts.h"
 
 namespace gapfarm::steps {
 namespace {
 
-constexpr double kLeastSlipGain = 11;
-constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means explain
+constexpr double kLeastOutlierShare = 0.03;  // of what the effects on the means explain
 
-// False where something else that was chosen makes single trials outliers.
-std::vector<bool> informative_about_slips(const DiagnosisRequest& of, const Explanation& partial) {
-  const Study& study = partial.study();
-  std::vector<bool> informative(study.size(), true);
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    const ResidualTrial& trial = study.trials[i];
-    if (!partial.first.empty() && trial.context.moved) informative[i] = false;
+// Trials that something else which is named makes outliers show nothing of an effect that would.
+void ignore_contaminated(const DiagnosisRequest& of, const Explanation& partial, Study* study) {
+  study->ignored.resize(study->size(), false);
+  for (std::size_t i = 0; i < study->size(); ++i) {
+    const ResidualTrial& trial = study->trials[i];
+    if (!partial.first.empty() && trial.context.moved) study->ignored[i] = true;
     for (const FoundSpread& found : partial.spreads) {
       const auto contaminates = found.row != nullptr ? found.row->contaminates : nullptr;
-      if (contaminates != nullptr && contaminates(trial)) informative[i] = false;
+      if (contaminates != nullptr && contaminates(trial)) study->ignored[i] = true;
     }
     for (const EffectCandidate& effect : partial.chosen) {
       const Signature& chosen = effect.signature;
       const auto contaminates = of.subject.effects->row(chosen.effect).contaminates;
-      if (contaminates != nullptr && contaminates(chosen, trial)) informative[i] = false;
+      if (contaminates != nullptr && contaminates(chosen, trial)) study->ignored[i] = true;
     }
   }
-  return informative;
-}
-
-std::vector<SlipTrial> judged_by(const SlipFit& slip, const Study& study,
-                                 const std::vector<Eigen::Vector3d>& left) {
-  return trials_with_slips(study.trials, left, slip, slip.probability * slip.loss / 2, 0);
-}
-
-// Whether most outlier trials end nowhere near where a slip would have led them.
-bool are_other_outliers(const std::vector<SlipTrial>& trials,
-                        const std::vector<bool>& informative) {
-  std::size_t as_slips = 0, otherwise = 0;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    if (!informative[i] || trials[i].squared < kSlippedSquared) continue;
-    ++(trials[i].nearest < kSlippedSquared ? as_slips : otherwise);
-  }
-  return otherwise > as_slips;
 }
 
 // Nats over all trials: as much as speaks for slips that are named.
@@ -63,26 +43,41 @@ std::string digits(double value) { return plain_number(rounded_to_digits(value, 
 }  // namespace
 
 Explanation look_for_spreads(const DiagnosisRequest& of, Explanation partial,
-                             const Regression& explained) {
-  constexpr double kStruck_nats = 0.5;
-  const double share = of.outlier_share();
+                             const Regression& explained, std::optional<double> by_means) {
   Study study = partial.study();
-  const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
-  const std::vector<double> without_it = scores_of(study, left, share);
-  const std::size_t before = partial.spreads.size();
+  const Eigen::VectorXd z = studentised(explained, 0.2);
+  const std::vector<Eigen::Vector3d> left = study.unwhiten(z);
+  Study seen = study;
+  ignore_contaminated(of, partial, &seen);
+  std::optional<FoundSpread> best;
+  std::string odd;
   for (const EffectDiagnosis* effect : *of.subject.effects) {
     const SpreadRow* row = effect->spread;
-    if (row == nullptr || row->by_session || of.excluded(row->effect)) continue;
-    SpreadFit fit = row->fit(study, left, share);
-    if (fit.gain < row->least_gain) continue;
-    const std::vector<double> with = row->scores(study, left, fit, share);
-    study.ignored.resize(study.size(), false);
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      if (with[i] > without_it[i] + kStruck_nats) study.ignored[i] = true;
+    if (row == nullptr || row->by_session || partial.spread(row->effect) != nullptr) continue;
+    if (row->after_means && !by_means) continue;
+    SpreadFit fit = row->fit(seen, left, of.outlier_share());
+    const double least = row->after_means ? kLeastOutlierShare * *by_means : 0;
+    if (fit.gain < std::max(row->least_gain, least)) continue;
+    if (of.excluded(row->effect))
+      fit.odd = "Single drives are outliers: nothing that could explain them was looked for.";
+    if (!fit.odd.empty()) {
+      odd = fit.odd;
+    } else if (!best || fit.gain > best->fit.gain) {
+      best = {row->effect, std::move(fit), row};
     }
-    partial.spreads.push_back({row->effect, std::move(fit), row});
   }
-  return partial.spreads.size() == before ? partial : without(partial, study.ignored);
+  if (!best) {
+    if (!odd.empty()) partial.odd_drives = odd;
+    return partial;
+  }
+  const auto strikes = best->row->contaminates;
+  study.ignored.resize(study.size(), false);
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const bool far = z.segment<3>(3 * static_cast<Eigen::Index>(i)).squaredNorm() > kFarSquared;
+    if (far && (strikes == nullptr || strikes(study.trials[i]))) study.ignored[i] = true;
+  }
+  partial.spreads.push_back(std::move(*best));
+  return without(partial, study.ignored);
 }
 
 Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation partial,
@@ -101,61 +96,6 @@ Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation parti
     partial.spreads.push_back({row->effect, std::move(fit), row});
   }
   return partial;
-}
-
-Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
-                           const Proposals& catalogue, const Regression& explained) {
-  if (!of.knows("slip_events")) return partial;
-  const Study& study = partial.study();
-  const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
-  const std::vector<bool> informative = informative_about_slips(of, partial);
-  const SlipFit slip = fit_slip(study.trials, left, informative, study.noise);
-  if (slip.gain < std::max(kLeastSlipGain, kLeastSlipShare * explained_nats(catalogue, explained)))
-    return partial;
-  if (of.excluded("slip_events")) {
-    partial.odd_drives =
-        "Single drives are outliers: nothing that could explain them was looked for.";
-    return partial;
-  }
-  const std::vector<SlipTrial> judged = judged_by(slip, study, left);
-  const Gathering gathering =
-      gathering_of_slips(study, mapped(judged, &SlipTrial::slipped), informative);
-  if (are_other_outliers(judged, informative)) {
-    partial.odd_drives =
-        "Single drives are outliers, most of them to where no slip would have led: nothing "
-        "explains them that was looked for.";
-  } else if (gathering.gain < kLeastGathering) {
-    const double p = slip.probability, loss = slip.loss;
-    partial.slip = slip;
-    partial.spreads.push_back({"slip_events",
-                               {slip.gain,
-                                {{"probability", p, 0.6 * p, 1.6 * p, "-"},
-                                 {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}}}});
-  } else {
-    partial.odd_drives = "Single drives are outliers, most of them " + gathering.where +
-                         ": something lies there that nothing explains which was looked for.";
-  }
-  return partial;
-}
-
-std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Explanation& before,
-                                          const Proposals& catalogue, const Explanation& rest) {
-  const auto has_place = [&](const EffectCandidate& c) {
-    return of.subject.effects->row(c.effect()).contaminates != nullptr;
-  };
-  if (std::none_of(before.chosen.begin(), before.chosen.end(), has_place)) return {};
-  if (std::any_of(rest.chosen.begin(), rest.chosen.end(), has_place)) return {};
-  Explanation everywhere = before;
-  std::erase_if(everywhere.chosen, has_place);
-  const Study& study = before.study();
-  const std::vector<Eigen::Vector3d> left =
-      study.unwhiten(studentised(explained_by(catalogue, everywhere), 0.2));
-  const std::vector<bool> informative = informative_about_slips(of, everywhere);
-  const SlipFit slip = fit_slip(study.trials, left, informative, study.noise);
-  Gathering found = gathering_of_slips(
-      study, mapped(judged_by(slip, study, left), &SlipTrial::slipped), informative);
-  if (found.gain < kLeastGathering) return {};
-  return found;
 }
 
 std::string outlier_text(const OutlierDrives& outliers) {

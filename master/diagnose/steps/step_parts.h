@@ -7,13 +7,9 @@
 #include <vector>
 
 #include "master/diagnose/correction/outlier_fit.h"
-#include "master/diagnose/evidence/slip.h"
 #include "master/diagnose/steps/steps.h"
 
 namespace gapfarm::steps {
-
-// Squared distance beyond which a trial is an outlier, with 3 degrees of freedom: one in 110.
-inline constexpr double kSlippedSquared = 11.5;
 
 // Hypotheses compete, beside what is explained already; what was chosen before is chosen anew.
 Result<Screening> compete(const DiagnosisRequest& of, Explanation found);
@@ -58,24 +54,16 @@ Explanation without(const Explanation& all, const std::vector<bool>& ignored);
 Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial);
 // Where paths were logged they say more of a lag than rest poses do, and have the last word.
 Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial);
-// Before any effect on the mean: outlier trials would pass for a patch of floor or a seam. Those
-// that are predicted better once the effect is foreseen show nothing of means.
+// The likeliest effect that makes single trials outliers; those that are predicted better once it
+// is foreseen show nothing of means.  Before any effect on the mean, for outlier trials would pass
+// for a patch of floor or a seam; `by_means`: beside what effects explain of the means (nats).
 Explanation look_for_spreads(const DiagnosisRequest& of, Explanation partial,
-                             const Regression& explained);
+                             const Regression& explained,
+                             std::optional<double> by_means = std::nullopt);
 // Whether each session has a gain of its own, of a spread that is clear from what is left of every
 // trial (m, m, rad); no statement about means uses them then.
 Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation partial,
                                    const std::vector<Eigen::Vector3d>& left);
-// Events that slow one side in some trials show as a tail along that side's derivative: a long one
-// when they are rare, a lopsided one when they are not.
-Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
-                           const Proposals& catalogue, const Regression& explained);
-
-// Where slips gather beside what acts everywhere, when what acted in a place `before` is gone from
-// the `rest`.  `catalogue` as it was before.
-std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Explanation& before,
-                                          const Proposals& catalogue, const Explanation& rest);
-
 // What is left once all that was chosen is explained, and the nats that it took.
 Regression explained_by(const Proposals& catalogue, const Explanation& explanation);
 double explained_nats(const Proposals& catalogue, const Regression& explained);
@@ -140,8 +128,5 @@ std::optional<PredictedOutliers> look_for_outliers(const DiagnosisRequest& of, c
                                                    const OutlierLesson& lesson);
 // "7 % of drives end as if ..."
 std::string outlier_text(const OutlierDrives& outliers);
-
-// Of a side's speed, over the trials that the fits learned from.
-double mean_loss_of_slips(const Explanation& named);
 
 }  // namespace gapfarm::steps

@@ -52,48 +52,16 @@ std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evide
 }
 
 // Beside a strong effect on the mean no outliers visibly; with it explained some may.
-Result<Screening> look_for_spreads_again(const DiagnosisRequest& of, Screening screening) {
-  Explanation& found = screening.found;
-  if (found.names_outliers() || found.chosen.empty()) return screening;
-  found = look_for_spreads(of, found, explained_by(*screening.catalogue, found));
-  if (!found.names_outliers()) return screening;
-  return compete(of, std::move(found));
-}
-
-// Trials in which a side slipped pull on every mean: the effects are looked for again without them,
-// but for those that are kept (none: empty).
-Result<Screening> choose_without_slips(const DiagnosisRequest& of, Screening screening,
-                                       const Regression& explained, const std::vector<bool>& kept) {
-  Explanation& found = screening.found;
-  const Eigen::VectorXd z = studentised(explained, 0.2);
-  std::vector<bool> ignored = found.study().ignored;
-  ignored.resize(found.study().size(), false);
-  for (std::size_t i = 0; i < ignored.size(); ++i) {
-    const bool slipped = z.segment<3>(3 * i).squaredNorm() > kSlippedSquared;
-    if (slipped && (kept.empty() || !kept[i])) ignored[i] = true;
+Result<Screening> look_for_spreads_beside(const DiagnosisRequest& of, Screening screening) {
+  for (;;) {
+    Explanation& found = screening.found;
+    const std::size_t before = found.spreads.size();
+    const Regression explained = explained_by(*screening.catalogue, found);
+    found = look_for_spreads(of, found, explained,
+                             std::max(0.0, explained_nats(*screening.catalogue, explained)));
+    if (found.spreads.size() == before) return screening;
+    ASSIGN_OR_RETURN(screening, compete(of, std::move(found)));
   }
-  found = without(found, ignored);
-  return compete(of, std::move(found));
-}
-
-Result<Screening> look_for_slips_and_choose(const DiagnosisRequest& of, Screening screening) {
-  const Regression explained = explained_by(*screening.catalogue, screening.found);
-  screening.found = look_for_slips(of, std::move(screening.found), *screening.catalogue, explained);
-  if (screening.found.spread("slip_events") == nullptr) return screening;
-  const Explanation before = screening.found;
-  const Proposals all = *screening.catalogue;  // refers to the evidence of before
-  auto rest = choose_without_slips(of, std::move(screening), explained, {});
-  if (!rest) return rest;
-  // A patch of floor moves single drives, too: it may have been omitted with them.
-  const auto gathering = gathering_beside(of, before, all, rest->found);
-  if (!gathering) return rest;
-  *rest->catalogue = all;
-  rest->found = before;
-  rest = choose_without_slips(of, std::move(*rest), explained, gathering->passed);
-  if (!rest) return rest;
-  rest->found.drop_spread("slip_events");
-  rest->found = look_for_slips(of, rest->found, all, explained_by(all, rest->found));
-  return rest;
 }
 
 // What the chosen effects leave of every trial, sessions' gains left in.
@@ -143,10 +111,9 @@ Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explana
   auto screening = found.frees_base ? compete_from_free_base(of, std::move(beside))
                                     : compete(of, std::move(beside));
   if (screening && found.frees_base && base_is_on_bounds(screening->found)) return screening;
-  if (screening) screening = look_for_spreads_again(of, std::move(*screening));
   if (screening) screening = look_for_session_gains_again(of, std::move(*screening));
-  if (!screening) return screening;
-  return look_for_slips_and_choose(of, std::move(*screening));
+  if (screening) screening = look_for_spreads_beside(of, std::move(*screening));
+  return screening;
 }
 
 // Whether sessions differ beside what was chosen, too, as clearly as it takes to name that.

@@ -16,7 +16,6 @@
 #include "master/diagnose/evidence/covariates.h"
 #include "master/diagnose/evidence/latency.h"
 #include "master/diagnose/evidence/session_gains.h"
-#include "master/diagnose/evidence/slip.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/study.h"
@@ -66,7 +65,6 @@ struct Explanation {
   std::vector<Signature> first;    // explained before anything else: late readings
   std::optional<Study> as_logged;  // where they were put right: the study before that
   PathLag lag;
-  SlipFit slip;  // of the slips that are named
   // What is named of readings, single trials and sessions.
   std::vector<FoundSpread> spreads;
   std::vector<EffectCandidate> chosen;
@@ -87,9 +85,8 @@ struct Explanation {
     std::erase_if(spreads, [&](const FoundSpread& s) { return s.effect == effect; });
   }
   bool names_outliers() const {
-    return std::ranges::any_of(spreads, [](const FoundSpread& s) {
-      return s.row != nullptr ? !s.row->by_session : s.effect == "slip_events";
-    });
+    return std::ranges::any_of(
+        spreads, [](const FoundSpread& s) { return s.row != nullptr && !s.row->by_session; });
   }
   bool names_anything() const { return !chosen.empty() || !spreads.empty(); }
 };

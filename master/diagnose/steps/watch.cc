@@ -85,9 +85,10 @@ void emit_readings(const DiagnosisRequest& of, const Explanation& found) {
   }
   if (found.spread("motor_lag") != nullptr)
     finding.text += "Paths show motors that lag by " + three_digits(found.lag.tau_s) + " s. ";
-  if (found.spread("slip_events") != nullptr) {
-    finding.text += fmt::format("In {} % of the drives a side slips. ",
-                                plain_number(rounded_to_digits(100 * found.slip.probability, 2)));
+  if (const FoundSpread* slips = found.spread("slip_events")) {
+    finding.text +=
+        fmt::format("In {} % of the drives a side slips. ",
+                    plain_number(rounded_to_digits(100 * slips->fit.estimates[0].value, 2)));
   }
   if (!found.odd_drives.empty()) finding.text += found.odd_drives + " ";
   if (finding.text.empty()) return;

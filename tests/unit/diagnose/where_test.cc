@@ -262,7 +262,7 @@ TEST(Findings, ReportEffectsInPlainUnits) {
 // What moves no mean cannot be screened by its probes: whoever adds such an effect says here how it
 // is looked for.
 TEST(Findings, EveryEffectOnTheSpreadIsLookedFor) {
-  const std::set<std::string> engine = {"slip_events", "pose_latency", "pose_quantisation"};
+  const std::set<std::string> engine = {"pose_latency", "pose_quantisation"};
   for (const Effect& effect : srv1_effects()) {
     const bool has_row = effect_diagnosis(effect.name).spread != nullptr;
     EXPECT_EQ(has_row, !effect.moves_means() && engine.count(effect.name) == 0) << effect.name;
