@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kFewestStarts = 20;
 // What does as well within so many nats is not distinguished.
-constexpr double kClearer_nats = 4;
+constexpr double kClearer_nats = 2;
 constexpr double kTriedShares[] = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7};
 
 std::vector<double> tried_angles() {
