@@ -90,6 +90,8 @@ NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size
   NamedEffect effect;
   effect.name = chosen.effect();
   effect.aliases = chosen.aliases;
+  // What is named beside it is no alternative to it.
+  std::erase_if(effect.aliases, [&](const std::string& alias) { return named.chose(alias); });
   effect.alias_reason =
       alias_sentence(effect.name, effect.aliases, of.subject.lacks(named.study(), of.problem.log));
   effect.confidence = confidence_of(chosen.gain, of.subject.least_gain);
