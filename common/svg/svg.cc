@@ -103,7 +103,11 @@ void Svg::begin_clip(SvgPoint corner, double width, double height) {
            "/></clipPath>\n<g clip-path=\"url(#" + id + ")\">\n";
 }
 
-void Svg::end_clip() { body_ += "</g>\n"; }
+void Svg::begin_part(SvgPoint corner) {
+  body_ += "<g transform=\"translate(" + number(corner.x) + " " + number(corner.y) + ")\">\n";
+}
+
+void Svg::end_part() { body_ += "</g>\n"; }
 
 std::string Svg::finish() const {
   return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + attribute("width", width_) +

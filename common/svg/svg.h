@@ -40,9 +40,11 @@ class Svg {
   void rectangle(SvgPoint corner, double width, double height, const SvgStyle& style);
   void circle(SvgPoint centre, double radius, const SvgStyle& style);
   void text(SvgPoint place, std::string_view content, const SvgText& how);
-  // What comes between the two is cut at the rectangle.
+  // What comes before the next end_part() is cut at the rectangle.
   void begin_clip(SvgPoint corner, double width, double height);
-  void end_clip();
+  // What comes before the next end_part() counts from this corner.
+  void begin_part(SvgPoint corner);
+  void end_part();
 
   // The whole document, on a white ground.
   std::string finish() const;

@@ -9,15 +9,11 @@
 #include "common/math/statistics.h"
 #include "common/pose/pose.h"
 #include "common/recordings/windows.h"
-#include "common/svg/svg.h"
+#include "master/infer/predictor.h"
+#include "master/report/figures/figures.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr const char* kLogged = "#888888";
-constexpr const char* kBefore = "#d55e00";
-constexpr const char* kAfter = "#0072b2";
-constexpr double kPanel = 300, kPad = 34, kLegend = 46;
 
 // Trials that all begin with their run and end further and further on.
 Status put_stretches(const RunLog& runs, double every_s, Problem* to, DrivenPaths* paths) {
@@ -45,58 +41,8 @@ Status put_stretches(const RunLog& runs, double every_s, Problem* to, DrivenPath
   return {};
 }
 
-Result<std::vector<Pose>> simulated_ends(Farm& farm, const Problem& problem) {
-  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)),
-                                                {prediction_task(Genome(), false)}));
-  const v1::TaskResult& result = results.front();
-  RETURN_IF_ERROR(ended_well(result));
-  return mapped(result.predict().predictions(),
-                [](const v1::Predicted& p) { return from_proto(p.end()); });
-}
-
 double end_distance(const std::vector<Pose>& a, const std::vector<Pose>& b) {
   return std::hypot(a.back().x - b.back().x, a.back().y - b.back().y);
-}
-
-// Metres to pixels of one panel.
-struct Scale {
-  SvgPoint corner;
-  double least_x = 0, most_y = 0, per_m = 1;
-
-  SvgPoint at(const Pose& X) const {
-    return {corner.x + (X.x - least_x) * per_m, corner.y + (most_y - X.y) * per_m};
-  }
-};
-
-Scale scale_of(const DrivenPath& path, SvgPoint corner) {
-  Extent box;
-  for (const auto* poses : {&path.logged, &path.before, &path.after}) {
-    for (const Pose& X : *poses) box.add(X);
-  }
-  const double room = kPanel - 2 * kPad;
-  const double per_m = room / std::max(box.longer_side(), 1e-3);
-  const double beside = (room - (box.x1 - box.x0) * per_m) / 2;
-  return {{corner.x + kPad + beside, corner.y + kPad}, box.x0, box.y1, per_m};
-}
-
-void draw_path(const std::vector<Pose>& poses, const Scale& scale, const char* colour, double width,
-               Svg* svg) {
-  std::vector<SvgPoint> points = mapped(poses, [&](const Pose& X) { return scale.at(X); });
-  svg->polyline(points, {"none", colour, width, {}, 0.9});
-  svg->circle(points.back(), 3.5, {colour, "none"});
-}
-
-void draw_panel(const DrivenPath& path, SvgPoint corner, Svg* svg) {
-  const Scale scale = scale_of(path, corner);
-  svg->rectangle({corner.x + 6, corner.y + 6}, kPanel - 12, kPanel - 12, {"none", "#dddddd"});
-  svg->text({corner.x + 14, corner.y + 22}, "run " + path.run, {});
-  draw_path(path.logged, scale, kLogged, 3, svg);
-  draw_path(path.before, scale, kBefore, 1.5, svg);
-  draw_path(path.after, scale, kAfter, 1.5, svg);
-  svg->circle(scale.at(path.logged.front()), 4, {"#ffffff", "#222222", 1.5});
-  const SvgPoint bar = {corner.x + 14, corner.y + kPanel - 14};
-  svg->line(bar, {bar.x + scale.per_m * 0.5, bar.y}, {"none", "#222222", 1.5});
-  svg->text({bar.x, bar.y - 5}, "0.5 m", {10});
 }
 
 }  // namespace
@@ -107,15 +53,15 @@ Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const Paramet
   asked.fitness.kind = FitnessKind::kLogScore;
   DrivenPaths paths;
   RETURN_IF_ERROR(put_stretches(runs, every_s, &asked, &paths));
-  ASSIGN_OR_RETURN(const auto before, simulated_ends(farm, asked));
-  asked.values = values;
-  ASSIGN_OR_RETURN(const auto after, simulated_ends(farm, asked));
+  Overrides fits;
+  for (std::size_t row = 0; row < values.size(); ++row) fits[row] = values[row];
+  ASSIGN_OR_RETURN(const auto ends, Predictor(farm, asked).ends({{{}, {}}, {fits, {}}}));
   std::size_t next = 0;
   std::vector<double> off_before, off_after;
   for (DrivenPath& path : paths.runs) {
     for (std::size_t k = 1; k < path.logged.size(); ++k, ++next) {
-      path.before.push_back(before[next]);
-      path.after.push_back(after[next]);
+      path.before.push_back(ends[0][next]);
+      path.after.push_back(ends[1][next]);
     }
     off_before.push_back(end_distance(path.before, path.logged));
     off_after.push_back(end_distance(path.after, path.logged));
@@ -181,26 +127,24 @@ std::vector<PathSample> measured_window(const RunLog& log, const Trial& window) 
 }
 
 std::string draw_paths(const DrivenPaths& paths, std::size_t most) {
-  const std::size_t count = std::min(most, paths.runs.size());
-  const std::size_t across = std::min<std::size_t>(3, std::max<std::size_t>(count, 1));
-  const std::size_t down = (count + across - 1) / across;
-  const double width = static_cast<double>(across) * kPanel;
-  Svg svg(width, static_cast<double>(down) * kPanel + kLegend);
-  for (std::size_t k = 0; k < count; ++k) {
-    draw_panel(paths.runs[k],
-               {static_cast<double>(k % across) * kPanel, static_cast<double>(k / across) * kPanel},
-               &svg);
+  std::vector<LineChart> charts;
+  for (std::size_t k = 0; k < std::min(most, paths.runs.size()); ++k) {
+    const DrivenPath& run = paths.runs[k];
+    LineChart& chart = charts.emplace_back();
+    chart.title = "run " + run.run;
+    chart.x_title = "x, m";
+    chart.y_title = "y, m";
+    chart.equal_axes = true;
+    for (const auto& [name, poses] :
+         {std::pair(fmt::format("fitted: ends {:.2f} m off (median)", paths.after_m), &run.after),
+          {fmt::format("as its files say: {:.2f} m", paths.before_m), &run.before},
+          {"logged", &run.logged}}) {
+      chart.series.push_back({name, mapped(*poses, [](const Pose& X) {
+                                return SvgPoint{X.x, X.y};
+                              })});
+    }
   }
-  const double y = static_cast<double>(down) * kPanel + 18;
-  const auto name = [&](double x, double row, const char* colour, const std::string& label) {
-    svg.line({x, row - 4}, {x + 22, row - 4}, {"none", colour, 3});
-    svg.text({x + 28, row}, label, {});
-  };
-  name(14, y, kLogged, "logged");
-  name(110, y, kBefore,
-       fmt::format("as its files say: ends {:.2f} m off (median)", paths.before_m));
-  name(110, y + 18, kAfter, fmt::format("fitted: {:.2f} m", paths.after_m));
-  return svg.finish();
+  return line_charts(charts, 2);
 }
 
 }  // namespace gapfarm

@@ -176,7 +176,7 @@ void draw_panel(Svg& svg, SvgPoint corner, const Scene& scene, const EffectDrive
   draw_scene(svg, view, corner, scene);
   for (const LoggedDrive& with : drives.with) draw(svg, view, with, kWith, "#111111");
   draw(svg, view, drives.without, kWithout, "#ffffff");
-  svg.end_clip();
+  svg.end_part();
   draw_bar(svg, view, corner);
 }
 

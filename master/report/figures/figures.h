@@ -20,6 +20,7 @@ struct ChartSeries {
   std::vector<SvgPoint> line = {};               // data units
   std::vector<SvgPoint> lower = {}, upper = {};  // ends of a band; empty: none
   bool dots = false;                             // a dot a point in place of the line
+  bool arrows = false;                           // from each second point to the next
 };
 
 struct ChartLevel {  // a horizontal line
@@ -42,6 +43,8 @@ struct LineChart {
 std::string series_colour(std::size_t i);
 
 std::string line_chart(const LineChart& chart);
+// Several as one picture, so many in a row.
+std::string line_charts(const std::vector<LineChart>& charts, std::size_t across);
 
 struct ChartBar {
   std::string name;

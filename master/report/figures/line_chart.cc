@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "master/report/figures/figures.h"
 
 namespace gapfarm {
@@ -130,6 +131,17 @@ SvgStyle stroke_of(std::size_t i, double width) {
       .stroke = series_colour(i), .stroke_width = width, .dash = i < kColours.size() ? "" : "7 4"};
 }
 
+void draw_arrow(Svg& svg, SvgPoint from, SvgPoint to, const SvgStyle& style) {
+  svg.line(from, to, style);
+  const double length = std::hypot(to.x - from.x, to.y - from.y);
+  if (length < 4) return;
+  const double ux = (to.x - from.x) / length, uy = (to.y - from.y) / length;
+  svg.polyline({{to.x - 5 * ux - 3 * uy, to.y - 5 * uy + 3 * ux},
+                to,
+                {to.x - 5 * ux + 3 * uy, to.y - 5 * uy - 3 * ux}},
+               style);
+}
+
 void draw_series(Svg& svg, const Frame& frame, const ChartSeries& series, std::size_t i) {
   const auto placed = [&](const std::vector<SvgPoint>& points) {
     std::vector<SvgPoint> pixels;
@@ -143,6 +155,10 @@ void draw_series(Svg& svg, const Frame& frame, const ChartSeries& series, std::s
   band.insert(band.end(), back.rbegin(), back.rend());
   if (band.size() > 2) svg.polyline(band, {.fill = series_colour(i), .opacity = 0.13}, true);
   const std::vector<SvgPoint> line = placed(series.line);
+  for (std::size_t k = 1; series.arrows && k < line.size(); k += 2) {
+    draw_arrow(svg, line[k - 1], line[k], stroke_of(i, 1.3));
+  }
+  if (series.arrows) return;
   if (series.dots) {
     for (const SvgPoint& p : line) svg.circle(p, 2.2, {.fill = series_colour(i), .opacity = 0.6});
   } else if (line.size() > 1) {
@@ -150,16 +166,16 @@ void draw_series(Svg& svg, const Frame& frame, const ChartSeries& series, std::s
   }
 }
 
-}  // namespace
+constexpr auto kLegendColumns = static_cast<std::size_t>((kWidth - kPlotX) / kLegendColumn);
 
-std::string series_colour(std::size_t i) { return kColours[i % kColours.size()]; }
-
-std::string line_chart(const LineChart& chart) {
-  const Frame frame = frame_of(chart);
+double height_of(const LineChart& chart) {
   const std::size_t entries = chart.series.size() + chart.levels.size();
-  const auto columns = static_cast<std::size_t>((kWidth - kPlotX) / kLegendColumn);
-  const double legend = kLegendRow * static_cast<double>((entries + columns - 1) / columns);
-  Svg svg(kWidth, kPlotY + frame.height + kAxis + legend + 10);
+  return kPlotY + kPlotHeight + kAxis + 10 +
+         kLegendRow * static_cast<double>((entries + kLegendColumns - 1) / kLegendColumns);
+}
+
+void draw_chart(Svg& svg, const LineChart& chart) {
+  const Frame frame = frame_of(chart);
   svg.text({18, 30}, chart.title, {.size = 16, .bold = true});
   draw_axes(svg, frame, chart);
   svg.begin_clip({kPlotX, kPlotY}, frame.width, frame.height);
@@ -176,19 +192,38 @@ std::string line_chart(const LineChart& chart) {
                {.size = 11, .colour = "#444444", .anchor = SvgAnchor::kEnd});
     }
   }
-  svg.end_clip();
-  for (std::size_t i = 0; i < entries; ++i) {
+  svg.end_part();
+  for (std::size_t i = 0; i < chart.series.size() + chart.levels.size(); ++i) {
     const SvgPoint place{
-        kPlotX + kLegendColumn * static_cast<double>(i % columns),
-        kPlotY + frame.height + kAxis + 8 + kLegendRow * static_cast<double>(i / columns)};
+        kPlotX + kLegendColumn * static_cast<double>(i % kLegendColumns),
+        kPlotY + frame.height + kAxis + 8 + kLegendRow * static_cast<double>(i / kLegendColumns)};
     const bool is_series = i < chart.series.size();
     svg.line(place, {place.x + 26, place.y}, is_series ? stroke_of(i, 3) : level_style);
     svg.text({place.x + 33, place.y + 4},
              is_series ? chart.series[i].name : chart.levels[i - chart.series.size()].name,
              {.size = 12});
   }
+}
+
+}  // namespace
+
+std::string series_colour(std::size_t i) { return kColours[i % kColours.size()]; }
+
+std::string line_charts(const std::vector<LineChart>& charts, std::size_t across) {
+  const double height = charts.empty() ? 0 : std::ranges::max(mapped(charts, height_of));
+  const std::size_t rows = (charts.size() + across - 1) / across;
+  Svg svg(kWidth * static_cast<double>(std::min(across, charts.size())),
+          height * static_cast<double>(rows));
+  for (std::size_t k = 0; k < charts.size(); ++k) {
+    svg.begin_part(
+        {kWidth * static_cast<double>(k % across), height * static_cast<double>(k / across)});
+    draw_chart(svg, charts[k]);
+    svg.end_part();
+  }
   return svg.finish();
 }
+
+std::string line_chart(const LineChart& chart) { return line_charts({chart}, 1); }
 
 std::string bar_chart(const std::string& title, const std::string& x_title,
                       const std::vector<ChartBar>& bars, std::optional<double> mark,

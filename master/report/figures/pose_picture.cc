@@ -214,7 +214,7 @@ void draw_panel(Svg& svg, const PosePanel& panel, SvgPoint corner) {
     const double heading_px = 21 + 14 * static_cast<double>(panel.clouds.size() - 1 - i);
     draw_cloud(svg, panel.clouds[i], kLooks[i % kPoseCloudStyles], heading_px, window);
   }
-  svg.end_clip();
+  svg.end_part();
   std::string note = std::to_string(panel.measured.size()) + " trials";
   if (beyond > 0) note += ", " + std::to_string(beyond) + " beyond the frame";
   svg.text({corner.x, corner.y - 9}, note, {.size = 11, .colour = kFaint});

@@ -20,7 +20,7 @@ TEST(Svg, IsXmlWhateverTheText) {
   svg.line({0, 0}, {std::nan(""), 1e300}, {.stroke = "#000000"});
   svg.polyline({}, {.stroke = "#000000"});
   svg.begin_clip({0, 0}, 10, 10);
-  svg.end_clip();
+  svg.end_part();
   std::istringstream text(svg.finish());
   boost::property_tree::ptree tree;
   ASSERT_NO_THROW(boost::property_tree::read_xml(text, tree));
