@@ -12,10 +12,10 @@
 #include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "common/recordings/windows.h"
 #include "common/score/fitness.h"
 #include "common/trials/text/csv.h"
 #include "master/ground/fit/kinematic_baseline.h"
+#include "master/ground/fit/window_set.h"
 
 namespace gapfarm {
 namespace {
@@ -23,13 +23,6 @@ namespace {
 constexpr double kSpeedSpan_s = 0.5;  // of poses before a window, for constant velocity
 // Windows in which the robot hardly went anywhere have no error a metre.
 constexpr double kLeastPathShare = 0.1;  // of the median way
-
-// Windows of one horizon: trials of a problem, one after another.
-struct Tiles {
-  double horizon_s = 0;
-  std::size_t first = 0;
-  std::size_t count = 0;
-};
 
 // Length of the marker's measured way in a window.
 double travel_of(const LoggedRun& run, const Trial& trial) {
@@ -193,26 +186,10 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   asked.values = values;
   asked.fitness.kind = FitnessKind::kLogScore;
   asked.log = {};
-  std::vector<Tiles> tiles;
-  std::vector<std::size_t> run_of;  // of each window, in the log
   const bool restarts = fitted.ground && is_throttled(fitted.ground->robot());
-  asked.runs.clear();
-  for (const double horizon : windows.horizons_s) {
-    auto cut = cut_windows(runs, {{horizon}, windows.run_in_s});
-    if (!cut) continue;  // longer than every run
-    tiles.push_back({horizon, asked.log.trials.size(), cut->log.trials.size()});
-    for (const Trial& trial : cut->log.trials) run_of.push_back(*trial.run);
-    if (restarts)
-      *cut = restart_at_measured_speed(runs, *std::move(cut), windows.run_in_s, kWindowMargin_s);
-    const auto before = static_cast<std::uint32_t>(restarts ? asked.runs.size() : 0);
-    if (!restarts) asked.runs.clear();
-    for (CommandedRun& run : cut->runs) asked.runs.push_back(std::move(run));
-    for (Trial& trial : cut->log.trials) {
-      *trial.run += before;
-      asked.log.trials.push_back(std::move(trial));
-    }
-  }
-  if (tiles.empty()) return Error{"no window of any horizon fits into the runs"};
+  ASSIGN_OR_RETURN(auto set, pose_windows(runs, windows, restarts, false));
+  asked.runs = std::move(set.runs);
+  asked.log.trials = std::move(set.trials);
   Horizons horizons;
   ASSIGN_OR_RETURN(const auto predicted, predict_runs(farm, asked, &horizons.unfinished_runs));
   std::vector<Pose> kinematic;
@@ -220,21 +197,25 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
     ASSIGN_OR_RETURN(horizons.kinematics, fit_kinematics(fitted));
     kinematic = kinematic_ends(asked, horizons.kinematics);
   }
-  for (const Tiles& t : tiles) {
+  for (int h = 0; h < set.lengths; ++h) {
+    const auto [from, end] = std::ranges::equal_range(set.horizon, h);
+    const auto first = static_cast<std::size_t>(from - set.horizon.begin());
+    const auto count = static_cast<std::size_t>(end - from);
     double log_score = 0;
-    for (std::size_t i = t.first; i < t.first + t.count; ++i) {
+    for (std::size_t i = first; i < first + count; ++i) {
       const std::optional<v1::Predicted>& simulated = predicted[i];
       const Trial& trial = asked.log.trials[i];
-      const LoggedRun& run = runs.runs[run_of[i]];
+      const LoggedRun& run = runs.runs[set.run_of[i]];
       const WindowError constant = error_of(constant_end(run, trial), trial);
-      horizons.windows.push_back(
-          {t.horizon_s, run.session, run.run, *trial.t_s, *trial.duration_s, travel_of(run, trial),
-           simulated ? error_of(from_proto(simulated->end()), trial) : kFar,
-           kinematic.empty() ? constant : error_of(kinematic[i], trial), constant});
-      log_score += simulated ? simulated->log_score() / static_cast<double>(t.count) : -kInfinity;
+      horizons.windows.push_back({set.lengths_s[static_cast<std::size_t>(h)], run.session, run.run,
+                                  *trial.t_s, *trial.duration_s, travel_of(run, trial),
+                                  simulated ? error_of(from_proto(simulated->end()), trial) : kFar,
+                                  kinematic.empty() ? constant : error_of(kinematic[i], trial),
+                                  constant});
+      log_score += simulated ? simulated->log_score() / static_cast<double>(count) : -kInfinity;
     }
-    horizons.rows.push_back(row_of(std::span(horizons.windows).subspan(t.first, t.count),
-                                   std::span(run_of).subspan(t.first, t.count)));
+    horizons.rows.push_back(row_of(std::span(horizons.windows).subspan(first, count),
+                                   std::span(set.run_of).subspan(first, count)));
     horizons.rows.back().log_score = log_score;
   }
   return horizons;

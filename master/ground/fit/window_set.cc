@@ -1,5 +1,7 @@
 #include "master/ground/fit/window_set.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -163,20 +165,23 @@ void add_blocks(const RunLog& log, WindowSet* set) {
 
 }  // namespace
 
+std::string WindowSet::length_text(int of_horizon) const {
+  return fmt::format("{:g} s", lengths_s[static_cast<std::size_t>(of_horizon % lengths)]);
+}
+
 double WindowSet::stretches() const {
   const auto of_poses = std::ranges::count_if(horizon, [this](int h) { return h < lengths; });
   return static_cast<double>(of_poses) / lengths;
 }
 
-Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
-                             const WindowSettings& settings) {
+Result<WindowSet> pose_windows(const RunLog& log, const WindowSettings& settings, bool restarts,
+                               bool once) {
   WindowSet set;
-  const bool restarts = is_throttled(robot);
   std::size_t last = 0;
   for (const double horizon : settings.horizons_s) {
     auto cut = cut_windows(log, {{horizon}, settings.run_in_s});
     if (!cut) continue;
-    if (!restarts && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
+    if (once && !restarts && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
     last = set.trials.size();
     for (const Trial& trial : cut->log.trials) set.run_of.push_back(*trial.run);
     if (restarts) {
@@ -191,9 +196,16 @@ Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
       set.horizon.push_back(set.horizons);
     }
     ++set.horizons;
+    set.lengths_s.push_back(horizon);
   }
   if (set.trials.empty()) return Error{"no window of any horizon fits into the runs"};
   set.lengths = set.horizons;
+  return set;
+}
+
+Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
+                             const WindowSettings& settings) {
+  ASSIGN_OR_RETURN(auto set, pose_windows(log, settings, is_throttled(robot), true));
   for (const Trial& trial : set.trials) set.origin_m += Eigen::Vector2d(trial.X_WS.x, trial.X_WS.y);
   set.origin_m /= static_cast<double>(set.trials.size());
   add_noise(log, &set);

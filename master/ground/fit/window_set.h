@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -37,7 +38,8 @@ struct WindowSet {
   std::vector<int> block;           // of each trial: what is held out or resampled together
   std::vector<std::size_t> run_of;  // of each trial: its run in the log
   int horizons = 0;
-  int lengths = 0;  // of the poses' windows: the first horizons
+  int lengths = 0;                // of the poses' windows: the first horizons
+  std::vector<double> lengths_s;  // of each of these, as asked for; 0: whole runs
   int blocks = 0;
   std::vector<int> run_blocks;  // of each run: its first block; those of one run follow each other
   // Of each trial, in its end's axes (m^2, m rad, rad^2); empty: the log does not say.
@@ -60,12 +62,20 @@ struct WindowSet {
   int blocks_of(std::size_t run) const {
     return (run + 1 < run_blocks.size() ? run_blocks[run + 1] : blocks) - run_blocks[run];
   }
+  // "0.5 s": how long windows of a horizon are, by poses or the gyro.
+  std::string length_text(int of_horizon) const;
   // Windows of poses a horizon: how often the log says something anew.
   double stretches() const;
 };
 
-// Blocks are runs, or stretches of them where there are fewer than ten.  Windows of robots with a
-// throttle restart (common/recordings/windows.h).  Errors: no window fits.
+// Windows of poses of each length that fits, without blocks; `restarts`: each has a run of its own
+// (restart_at_measured_speed()); `once`: those that are the same as of the length before are
+// omitted.  Errors: no window fits.
+Result<WindowSet> pose_windows(const RunLog& log, const WindowSettings& settings, bool restarts,
+                               bool once);
+
+// The same with all else.  Blocks are runs, or stretches of them where there are fewer than ten.
+// Windows of robots with a throttle restart (common/recordings/windows.h).  Errors: no window fits.
 Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
                              const WindowSettings& settings);
 

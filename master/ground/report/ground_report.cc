@@ -225,7 +225,7 @@ void GroundReport::judge() {
     }
     return;
   }
-  d_.where = where_left(fitter_, search_, options_.windows.horizons_s);
+  d_.where = where_left(fitter_, search_);
   if (!moved.empty()) {
     d_.findings.push_back("Were all values free, these would move most: " + moved + ".");
   }
@@ -285,9 +285,7 @@ void GroundReport::trials() {
     DiagnosedTrial t;
     t.session = from.session;
     t.trial = static_cast<std::int64_t>(i);
-    t.command = fmt::format("{:g} s", options_.windows.horizons_s.at(std::min<std::size_t>(
-                                          static_cast<std::size_t>(search_.windows.horizon[i]),
-                                          options_.windows.horizons_s.size() - 1)));
+    t.command = search_.windows.length_text(search_.windows.horizon[i]);
     t.session_time_s = *from.t_s;
     t.duration_s = *from.duration_s;
     t.held_out = true;

@@ -106,16 +106,14 @@ std::string value_move(const FitRow& row, double moved) {
   return fmt::format("{} by {:+.2g} {}", row.row.name, moved, row.row.unit);
 }
 
-Where finding_of(const ComponentGap& gap, int component, double all,
-                 const std::vector<double>& horizons_s) {
+Where finding_of(const ComponentGap& gap, int component, double all, const WindowSet& windows) {
   static constexpr std::array<const char*, 3> kNames = {"x", "y", "theta"};
   static constexpr std::array<const char*, 3> kSpoken = {"along the way", "across the way",
                                                          "in the heading"};
   Where w;
   w.component = kNames[component];
   const auto longest = std::max_element(gap.by_horizon.begin(), gap.by_horizon.end());
-  const auto h = static_cast<std::size_t>(longest - gap.by_horizon.begin());
-  w.command = fmt::format("{:g} s", horizons_s.at(std::min(h, horizons_s.size() - 1)));
+  w.command = windows.length_text(static_cast<int>(longest - gap.by_horizon.begin()));
   const double mean = gap.offset / std::max(1.0, gap.count);
   const double error =
       std::sqrt(std::max(gap.squares / std::max(1.0, gap.count) - mean * mean, 1e-18) /
@@ -280,8 +278,7 @@ std::string nearest_of_catalogue(const GroundSearch& search) {
       search.smooth->depends_on);
 }
 
-std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search,
-                              const std::vector<double>& horizons_s) {
+std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search) {
   const WindowFit& now = search.chain.back();
   const WindowSet& windows = search.windows;
   const std::vector<Eigen::Vector3d> raw = fitter.raw_residuals(now);
@@ -313,7 +310,7 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
   for (int c = 0; c < 3 && all > 0; ++c) {
     const ComponentGap& gap = gaps[c];
     if (gap.nats < kLeastShareOfGap * all) continue;
-    found.push_back(finding_of(gap, c, all, horizons_s));
+    found.push_back(finding_of(gap, c, all, windows));
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const Where& a, const Where& b) { return a.share > b.share; });

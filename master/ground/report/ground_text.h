@@ -74,8 +74,7 @@ std::string nearest_of_catalogue(const GroundSearch& search);
 
 // One finding a component that holds a quarter of what could still be closed or more, largest
 // first: at which horizon it is largest, and from when on in the log, where one half holds it.
-std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search,
-                              const std::vector<double>& horizons_s);
+std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search);
 
 // "These runs do not show whether these are right: the distance between the sides.", of values that
 // the log leaves as unsure as they were before it; empty: there are none.

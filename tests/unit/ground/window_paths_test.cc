@@ -1,6 +1,7 @@
 // What was measured within a window, from the log that it was cut from and from others.
 #include <gtest/gtest.h>
 
+#include "master/ground/fit/window_set.h"
 #include "master/ground/paths.h"
 
 namespace gapfarm {
@@ -43,6 +44,21 @@ TEST(MeasuredWindow, IsEmptyOfAnotherLog) {
   renamed.runs[0].session = "tuesday";
   EXPECT_TRUE(measured_window(renamed, windows->log.trials[1]).empty());
   EXPECT_TRUE(measured_window({}, windows->log.trials[1]).empty());
+}
+
+// Poses so rare that two lengths are the same windows: these are the shorter's, the next its own.
+TEST(WindowSet, NamesWindowsByTheirOwnLength) {
+  RunLog log = straight_log(0.5);
+  std::vector<PoseRow> rare;
+  for (std::size_t k = 0; k < log.runs[0].poses.size(); k += 20) {
+    rare.push_back(log.runs[0].poses[k]);
+  }
+  log.runs[0].poses = rare;
+  const auto set = window_set(GroundRobot(), log, {{0.5, 1, 4}, 0.5});
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  ASSERT_EQ(set->lengths, 2);
+  EXPECT_EQ(set->length_text(0), "0.5 s");
+  EXPECT_EQ(set->length_text(1), "4 s");
 }
 
 }  // namespace
