@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "common/base/guarded.h"
@@ -13,6 +13,8 @@
 #include "master/ground/catalogue.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/fit.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm {
 namespace {
@@ -61,26 +63,31 @@ class ProgramFarm {
 
   // Of one set of windows.
   decltype(WindowSet::simulated) simulation(const WindowSet& windows) {
-    Problem asked = problem_;
-    asked.genes.clear();
-    asked.runs = windows.runs;
-    asked.log.trials = windows.trials;
-    auto known = std::make_shared<Known>();
-    known->problem = farm_.add_problem(to_proto(asked));
-    for (const Trial& trial : windows.trials) known->starts.push_back(trial.X_WS);
-    return [this, known](const std::vector<Kinematics>& points) { return ends(points, *known); };
+    auto asked = std::make_shared<Asked>(farm_, problem_, windows);
+    return [this, asked](const std::vector<Kinematics>& points) { return ends(points, *asked); };
   }
 
  private:
-  using Motions = std::shared_ptr<const std::vector<Pose>>;  // X_SE, one a window
-  struct Known {
-    std::string problem;
-    std::vector<Pose> starts;
-    std::deque<std::pair<std::vector<double>, Motions>> motions;
+  struct Asked {
+    Asked(Farm& farm, Problem of, const WindowSet& windows)
+        : problem(std::move(of)), predictor(farm, with_windows(problem, windows)) {}
+
+    static const Problem& with_windows(Problem& problem, const WindowSet& windows) {
+      problem.genes.clear();
+      problem.runs = windows.runs;
+      problem.log.trials = windows.trials;
+      return problem;
+    }
+
+    Problem problem;
+    Predictor predictor;
+    infer::Forward forward =
+        infer::remembering([this](const auto& points) { return predictor.attempt(points); }, kKept);
   };
 
-  std::vector<double> asked_values(const Kinematics& at) const {
-    std::vector<double> values = problem_.values;
+  // Of its robot's own origin.
+  Overrides asked_values(const Kinematics& at) const {
+    Overrides values;
     for (const char* row : kMarkerRows) values[problem_.table().row(row)] = 0;
     for (std::size_t k = 0; k < at.names.size(); ++k) {
       const auto row = problem_.table().find(at.names[k]);
@@ -91,55 +98,30 @@ class ProgramFarm {
     return values;
   }
 
-  static Motions find(const Known& known, const std::vector<double>& values) {
-    for (const auto& [at, motions] : known.motions) {
-      if (at == values) return motions;
-    }
-    return nullptr;
-  }
-
-  Motions motions_of(const v1::TaskResult& result, const Known& known) {
-    auto motions = std::make_shared<std::vector<Pose>>(known.starts.size(), Pose{kFar_m, 0, 0});
-    if (result.outcome() == v1::OK) {
-      for (std::size_t i = 0; i < motions->size(); ++i) {
-        const auto& end = result.predict().predictions(static_cast<int>(i)).end();
-        (*motions)[i] = between(known.starts[i], from_proto(end));
-      }
-    } else if (result.outcome() == v1::WORKER_FAILED || result.outcome() == v1::INVALID_REQUEST) {
-      failure_ = Error{"the program: " + result.message(), ErrorCode::kSimulation};
-    }
-    return motions;
-  }
-
   // What fails is far away, and ends the diagnosis where it is looked at next.
-  std::vector<std::vector<Pose>> ends(const std::vector<Kinematics>& points, Known& known) {
-    std::vector<std::vector<double>> missing;
-    for (const Kinematics& at : points) {
-      auto values = asked_values(at);
-      const bool there = find(known, values) != nullptr || contains(missing, values);
-      if (!there) missing.push_back(std::move(values));
+  std::vector<std::vector<Pose>> ends(const std::vector<Kinematics>& points, Asked& asked) {
+    std::vector<std::optional<std::vector<Pose>>> all(points.size());
+    if (failure_) {
+      auto found = asked.forward(mapped(points, [&](const Kinematics& at) {
+        return PredictionRequest{asked_values(at), {}};
+      }));
+      if (!found) failure_ = found.error();
+      if (const auto& why = asked.predictor.broken()) {
+        failure_ = Error{"the program: " + *why, ErrorCode::kSimulation};
+      }
+      if (found) all = std::move(*found);
     }
-    const auto tasks = mapped(missing, [&](const std::vector<double>& values) {
-      return prediction_task(overrides_of(problem_.values, values), true);
-    });
-    if (failure_ && !tasks.empty()) {
-      const auto results = farm_.run(known.problem, tasks);
-      if (!results) failure_ = results.error();
-      for (std::size_t k = 0; results && k < missing.size(); ++k) {
-        known.motions.emplace_back(missing[k], motions_of((*results)[k], known));
+    std::vector<std::vector<Pose>> read;
+    const std::vector<Trial>& trials = asked.problem.log.trials;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const TrackerReading reading(points[k], X_RM_);
+      std::vector<Pose>& there = read.emplace_back();
+      for (std::size_t i = 0; i < trials.size(); ++i) {
+        const Pose X_SE = all[k] ? between(trials[i].X_WS, (*all[k])[i]) : Pose{kFar_m, 0, 0};
+        there.push_back(reading.end(trials[i].X_WS, X_SE));
       }
     }
-    std::vector<std::vector<Pose>> all;
-    for (const Kinematics& at : points) {
-      const Motions motions = find(known, asked_values(at));
-      const TrackerReading reading(at, X_RM_);
-      std::vector<Pose>& there = all.emplace_back();
-      for (std::size_t i = 0; i < known.starts.size(); ++i) {
-        there.push_back(reading.end(known.starts[i], motions ? (*motions)[i] : Pose{kFar_m, 0, 0}));
-      }
-    }
-    while (known.motions.size() > kKept) known.motions.pop_front();
-    return all;
+    return read;
   }
 
   Farm& farm_;

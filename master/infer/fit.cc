@@ -344,19 +344,24 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
   return scores;
 }
 
-Forward remembering(Forward forward) {
+Forward remembering(Forward forward, std::size_t most) {
   using Point = std::pair<Overrides, std::vector<std::uint32_t>>;
   using Ends = std::optional<std::vector<Pose>>;
-  return [forward = std::move(forward), known = std::make_shared<std::map<Point, Ends>>()](
+  return [forward = std::move(forward), most, known = std::make_shared<std::map<Point, Ends>>()](
              const std::vector<PredictionRequest>& points) -> Result<std::vector<Ends>> {
+    if (known->size() > most) known->clear();
     std::vector<PredictionRequest> unknown;
     for (const PredictionRequest& p : points) {
-      if (known->count({p.at, p.trials}) == 0) unknown.push_back(p);
+      if (known->try_emplace({p.at, p.trials}).second) unknown.push_back(p);
     }
     if (!unknown.empty()) {
-      ASSIGN_OR_RETURN(auto ends, forward(unknown));
+      auto ends = forward(unknown);
+      if (!ends) {
+        known->clear();
+        return ends.error();
+      }
       for (std::size_t k = 0; k < unknown.size(); ++k) {
-        (*known)[{unknown[k].at, unknown[k].trials}] = std::move(ends[k]);
+        (*known)[{unknown[k].at, unknown[k].trials}] = std::move((*ends)[k]);
       }
     }
     return mapped(points, [&](const PredictionRequest& p) { return known->at({p.at, p.trials}); });

@@ -48,9 +48,9 @@ struct Observations {
 using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>>>>(
     const std::vector<PredictionRequest>& points)>;
 
-// The same, asking once for what was asked before: a fit of what no simulation moves stays where it
-// is.
-Forward remembering(Forward forward);
+// The same, asking once for what was asked before, of some `most` points and the last batch: a fit
+// of what no simulation moves stays where it is.
+Forward remembering(Forward forward, std::size_t most = SIZE_MAX);
 
 struct Fit {
   Eigen::VectorXd u;            // in the space's coordinates

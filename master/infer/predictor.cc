@@ -192,6 +192,9 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
     const auto& [k, part] = asked[t];
     const v1::TaskResult& result = results[t];
     if (result.outcome() != v1::OK) {
+      const bool broken =
+          result.outcome() == v1::WORKER_FAILED || result.outcome() == v1::INVALID_REQUEST;
+      if (broken) broken_ = result.message();
       if (!(*errors)[k]) (*errors)[k] = bad_point(problem_, requests[k].at, result);
       ends[k].reset();
     }

@@ -58,6 +58,8 @@ class Predictor {
                                                      double interval_s);
   // The last failure as an error of the simulation's.
   Error failed(const std::string& what) const;
+  // Why a worker could not do its work, which is nobody's point; nothing: none failed.
+  const std::optional<std::string>& broken() const { return broken_; }
 
  private:
   // Trials of one share a simulation, unless their places matter.
@@ -75,6 +77,7 @@ class Predictor {
   std::string hash_;
   std::vector<std::uint32_t> by_condition_;  // trials, those that share a simulation in a row
   std::string last_failure_;
+  std::optional<std::string> broken_;
   std::map<std::string, std::string> excluded_;
 };
 
