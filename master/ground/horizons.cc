@@ -16,6 +16,7 @@
 #include "common/trials/text/csv.h"
 #include "master/ground/fit/kinematic_baseline.h"
 #include "master/ground/fit/window_set.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
@@ -127,7 +128,6 @@ std::string significantly_apart(const Horizons& horizons) {
 }
 
 constexpr std::size_t kRatioDraws = 1000;
-constexpr std::size_t kEnoughRunsToDraw = 10;
 constexpr std::size_t kLeastDrawn = 5;  // fewer do not span 90 % of where a median may be
 constexpr double kRatioTail = 0.05;
 constexpr double kNoError = 1e-12;
@@ -143,8 +143,8 @@ std::vector<std::vector<std::size_t>> groups_of(std::span<const std::size_t> run
   std::vector<std::vector<std::size_t>> groups;
   for (const auto& [name, windows] : runs) {
     std::size_t pieces = 1;
-    if (runs.size() < kEnoughRunsToDraw) {
-      pieces = (kEnoughRunsToDraw * windows.size() + run.size() - 1) / run.size();
+    if (runs.size() < kRunsToDraw) {
+      pieces = (kRunsToDraw * windows.size() + run.size() - 1) / run.size();
       pieces = std::min(pieces, windows.size());
     }
     const std::size_t first = groups.size();

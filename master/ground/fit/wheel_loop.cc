@@ -19,9 +19,7 @@ namespace {
 constexpr double kStart_s = 1;   // of a run: wheels that stood are still speeding up
 constexpr double kWindow_s = 2;  // over which speeds are averaged
 constexpr double kLoopStep_s = 0.04;
-constexpr int kWindowsABlock = 5;  // where there are few runs
-constexpr std::size_t kFewRuns = 10;
-constexpr int kLoopDraws = 400;
+constexpr int kWindowsABlock = 5;    // where there are few runs
 constexpr double kLeastLoss = 0.02;  // of the fastest command: below it losses are in proportion
 constexpr double kLooseGain = 1;     // prior s.d. about 1 and 0, so that one speed does
 constexpr double kLooseLoss = 0.1;   // of the fastest command
@@ -73,7 +71,7 @@ LoopWindows loop_windows(const GroundRobot& robot, const RunLog& log) {
   LoopWindows windows;
   for (const LoggedRun& run : log.runs) {
     if (run.commands.empty() || run.wheel_speeds.empty()) continue;
-    cut_run(robot, log, run, log.runs.size() < kFewRuns, &windows);
+    cut_run(robot, log, run, log.runs.size() < kRunsToDraw, &windows);
   }
   return windows;
 }
@@ -169,15 +167,15 @@ WheelLoop measure_wheel_loop(const GroundRobot& robot, const RunLog& log, const 
   const auto [share, expected] = shares_of(here, {}, loop_of({}), fastest);
   Stream stream({seed, Purpose::kStatistics, 3, 0, 0});
   double sum = 0, squares = 0;
-  for (int d = 0; d < kLoopDraws; ++d) {
+  for (int d = 0; d < kGroundDraws; ++d) {
     const Eigen::Vector2d loop = loop_of(draw_again(there.blocks, &stream));
     const Shares drawn = shares_of(here, draw_again(here.blocks, &stream), loop, fastest);
     const double change = drawn.share / drawn.expected - 1;
     sum += change;
     squares += change * change;
   }
-  const double mean = sum / kLoopDraws;
-  const double variance = std::max(0.0, squares / kLoopDraws - mean * mean);
+  const double mean = sum / kGroundDraws;
+  const double variance = std::max(0.0, squares / kGroundDraws - mean * mean);
   const double change = share / expected - 1, wide = 1.645 * std::sqrt(variance);
   result.share = share;
   result.expected = expected;

@@ -13,11 +13,9 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kLeastBlocks = 10;  // fewer runs than this are cut into stretches
-// The same of increments, which know of nothing that lasts: tens of stretches say better how far
+// kRunsToDraw of increments, which know of nothing that lasts: tens of stretches say better how far
 // values scatter.
 constexpr std::size_t kLeastRelativeBlocks = 30;
-constexpr double kMargin_s = 11;  // of commands round a window: clocks may be 10 s apart
 // Of wheels that roll: what they slip by in the root of a metre of their way, m and rad. OptiOdom's
 // and a Create's whole runs end 0.01 to 0.05 off (docs/evidence/ground.md).
 constexpr double kSlip = 0.03;
@@ -145,7 +143,7 @@ void add_blocks(const RunLog& log, WindowSet* set) {
   // Stretches of one length, none over two runs.
   std::vector<int>& first = set->run_blocks;
   first.resize(log.runs.size());
-  const std::size_t least = log.relative ? kLeastRelativeBlocks : kLeastBlocks;
+  const std::size_t least = log.relative ? kLeastRelativeBlocks : kRunsToDraw;
   const bool few = log.runs.size() < least;
   for (std::size_t i = 0; i < log.runs.size(); ++i) {
     first[i] = set->blocks;
@@ -185,7 +183,7 @@ Result<WindowSet> pose_windows(const RunLog& log, const WindowSettings& settings
     last = set.trials.size();
     for (const Trial& trial : cut->log.trials) set.run_of.push_back(*trial.run);
     if (restarts) {
-      *cut = restart_at_measured_speed(log, std::move(*cut), settings.run_in_s, kMargin_s);
+      *cut = restart_at_measured_speed(log, std::move(*cut), settings.run_in_s, kClocksApart_s);
       for (Trial& trial : cut->log.trials) *trial.run += static_cast<std::uint32_t>(last);
       set.runs.insert(set.runs.end(), cut->runs.begin(), cut->runs.end());
     } else {
