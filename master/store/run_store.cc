@@ -81,7 +81,7 @@ bool is_unborn(const fs::path& file) {
 
 Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   std::error_code code;
-  fs::create_directories(run, code);
+  const bool made = fs::create_directories(run, code);
   if (code) {
     return Error{run.string() + ": cannot make the run folder: " + code.message() +
                  "; choose another --out"};
@@ -97,13 +97,14 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   if (complete.program_version.empty()) complete.program_version = build_info().version;
   if (complete.fingerprint.empty()) complete.fingerprint = build_info().fingerprint;
   complete.created = utc_text(unix_now_s(), kStoredTime);
-  RETURN_IF_ERROR(create_tables(database, complete));
-  RETURN_IF_ERROR(sync_to_disk(run));
-
   RunStore store(run, std::move(lock), std::move(database));
   store.info_ = std::move(complete);
-  RETURN_IF_ERROR(store.begin_epoch());
-  return store;
+  Status begun = create_tables(store.database_, store.info_);
+  if (begun) begun = sync_to_disk(run);
+  if (begun) begun = store.begin_epoch();
+  if (begun) return store;
+  static_cast<void>(discard(std::move(store), made));  // why it could not begin says more
+  return begun.error();
 }
 
 Status RunStore::discard(RunStore store, bool with_folder) {
@@ -113,8 +114,8 @@ Status RunStore::discard(RunStore store, bool with_folder) {
     const Database closing = std::move(store.database_);
   }
   std::error_code code;
-  for (const char* name :
-       {"run.sqlite", "run.sqlite-wal", "run.sqlite-shm", "log.txt", "run.lock"}) {
+  for (const char* name : {"run.sqlite", "run.sqlite-wal", "run.sqlite-shm", "run.sqlite-journal",
+                           "log.txt", "run.lock"}) {
     fs::remove(run / name, code);
     if (code) {
       return Error{(run / name).string() + ": cannot be taken away: " + code.message() +

@@ -130,6 +130,18 @@ TEST_F(StoreFaults, ARunIsCreatedOrNot) {
       EIO);
 }
 
+TEST_F(StoreFaults, ARunThatCannotBeCreatedLeavesNoFolder) {
+  IoFaults::watch(run().string());
+  ASSERT_TRUE(RunStore::create(run(), example_info()).ok());
+  const long calls = IoFaults::calls();
+  fs::remove_all(run());
+  IoFaults::fail(run().string(), calls / 2, false, ENOSPC);
+  const auto store = RunStore::create(run(), example_info());
+  IoFaults::rest();
+  ASSERT_FALSE(store.ok());
+  EXPECT_FALSE(fs::exists(run())) << store.error().message;
+}
+
 TEST_F(StoreFaults, GoingBackIsAllOrNothing) {
   make_run(4);
   fail_everywhere(
