@@ -124,7 +124,7 @@ int work(const Arguments& arguments) {
   if (!security) return complain(security.error(), kExitRefused);
   StopSource stop;
   // Ctrl-C reaches the whole terminal's group; what it means is the parent's to decide.
-  const StopOnSignals signals(&stop, /*ignore_interrupt=*/true);
+  const StopOnSignals signals(&stop, StopOnSignals::kIgnoreInterrupt);
   ServiceOptions options = arguments;
   options.security = std::move(*security);
   options.session.host = host_name();

@@ -23,10 +23,14 @@ std::int64_t monotonic_ns() {  // async-signal-safe
 
 // A handler takes no argument, so the one instance that signals go to has to be global.
 std::atomic<StopSource*> signal_target{nullptr};
+std::atomic<bool> second_ends{false};
 
 void handle(int signal) {
   const int saved_errno = errno;
-  if (StopSource* stop = signal_target.load()) stop->request(signal);
+  if (StopSource* stop = signal_target.load()) {
+    const bool last = second_ends.load() && (stop->requests() > 0 || !stop->heeded());
+    if (stop->request(signal) && last) _exit(128 + signal);
+  }
   errno = saved_errno;
 }
 
@@ -63,15 +67,15 @@ struct StopOnSignals::Saved {
   struct sigaction terminate;
 };
 
-StopOnSignals::StopOnSignals(StopSource* stop, bool ignore_interrupt)
-    : saved_(std::make_unique<Saved>()) {
+StopOnSignals::StopOnSignals(StopSource* stop, Way way) : saved_(std::make_unique<Saved>()) {
   assert(signal_target.load() == nullptr);
   signal_target.store(stop);
+  second_ends.store(way == kSecondEnds);
   struct sigaction action = {};
   sigemptyset(&action.sa_mask);
   action.sa_handler = handle;  // without SA_RESTART, so that blocking calls return
   sigaction(SIGTERM, &action, &saved_->terminate);
-  if (ignore_interrupt) action.sa_handler = SIG_IGN;
+  if (way == kIgnoreInterrupt) action.sa_handler = SIG_IGN;
   sigaction(SIGINT, &action, &saved_->interrupt);
   // A parent may have blocked them until the handlers stood.
   sigset_t set;

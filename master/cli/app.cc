@@ -1,12 +1,9 @@
-#include <signal.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cassert>
 #include <cerrno>
 #include <cstdlib>
 #include <iostream>
+#include <sstream>
 
 #include "common/base/build_info.h"
 #include "common/base/ranges.h"
@@ -20,42 +17,6 @@
 
 namespace gapfarm {
 namespace {
-
-// A handler takes no argument, so the one instance that signals go to has to be global.
-std::atomic<StopSource*> target{nullptr};
-
-void handle(int signal) {
-  const int saved_errno = errno;
-  StopSource* stop = target.load();
-  const bool again = stop == nullptr || stop->requested();
-  if (stop == nullptr || (stop->request(signal) && again)) _exit(128 + signal);
-  errno = saved_errno;
-}
-
-// While it lives, the first SIGINT or SIGTERM goes to `stop` (a flag and a descriptor to poll), and
-// a second one ends the process at once with 128 + signal.  At most one at a time.
-class UserInterrupts {
- public:
-  explicit UserInterrupts(StopSource* stop) {
-    assert(target.load() == nullptr);
-    target.store(stop);
-    install(handle);
-  }
-  ~UserInterrupts() {
-    install(SIG_DFL);
-    target.store(nullptr);
-  }
-  UserInterrupts& operator=(UserInterrupts&&) = delete;
-
- private:
-  static void install(void (*handler)(int)) {
-    struct sigaction action = {};
-    sigemptyset(&action.sa_mask);
-    action.sa_handler = handler;  // without SA_RESTART, so that blocking calls return
-    sigaction(SIGINT, &action, nullptr);
-    sigaction(SIGTERM, &action, nullptr);
-  }
-};
 
 constexpr const char* kExamples =
     "Examples:\n"
@@ -128,7 +89,12 @@ int answer_parse_error(const CLI::App& app, const CLI::ParseError& error, Consol
   const std::string word = unknown.empty() ? "" : unknown.front();
   const bool is_command = !word.empty() && !is_option(word) && !at.get_subcommands({}).empty();
   // --help, --version; but no help is about a command that there is not.
-  if (error.get_exit_code() == 0 && !is_command) return app.exit(error);
+  if (error.get_exit_code() == 0 && !is_command) {
+    std::ostringstream text;
+    const int exit_code = app.exit(error, text, text);
+    console.print(text.str());
+    return exit_code;
+  }
   if (!word.empty()) {
     console.error({(is_command ? "unknown command '" : "did not expect '") + word + "'" +
                    did_you_mean(at, word)});
@@ -186,7 +152,7 @@ int run_arguments(const std::vector<std::string>& arguments) {
   }
   if (program->json) console.use_json();
   StopSource stop;
-  const UserInterrupts interrupts(&stop);
+  const StopOnSignals signals(&stop, StopOnSignals::kSecondEnds);
   CliContext context{console, stop};
   for (std::size_t i = 0; i < program->runs.size(); ++i) {
     const char* name = subcommands()[i].name;
@@ -198,6 +164,15 @@ int run_arguments(const std::vector<std::string>& arguments) {
     return exit_code;
   }
   return kExitBadUsage;
+}
+
+Status check_options_of(const std::string& use, std::span<const OptionOf> options,
+                        const CLI::App& app) {
+  for (const OptionOf& row : options) {
+    if (use == row.use || app.count(row.option) == 0) continue;
+    return Error{std::string(row.option) + " is of " + row.use + ", not of " + use + "; omit it"};
+  }
+  return {};
 }
 
 std::span<const Subcommand> subcommands() {

@@ -27,6 +27,14 @@ struct Subcommand {
 
 std::span<const Subcommand> subcommands();
 
+struct OptionOf {
+  const char* option;
+  const char* use;  // that alone has it
+};
+// Error: `app` was given an option that is of another use than this one: it would do nothing.
+Status check_options_of(const std::string& use, std::span<const OptionOf> options,
+                        const CLI::App& app);
+
 #define COMMAND(folder, file, name, summary, group) SubcommandRun setup_##file(CLI::App& app);
 #include "master/cli/commands.inc"
 

@@ -112,6 +112,7 @@ class LongCommand::Asked : public RecordedFarm {
 Status LongCommand::begin(const std::string& command, const KeepingPlace& place,
                           std::vector<ProgressStage> stages, CliContext& context) {
   context.begun = true;
+  if (context.stop.requested()) return stop_requested();
   std::error_code code;
   fs::create_directories(place.folder, code);
   if (code) return Error{place.folder.string() + ": cannot make the folder: " + code.message()};

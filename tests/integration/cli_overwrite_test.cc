@@ -181,4 +181,23 @@ TEST_F(Overwrite, ResultsAreOnStandardOutputInTextOrAsJson) {
               HasSubstr("--wrokers"));
 }
 
+TEST_F(Overwrite, OptionsThatWouldDoNothingAreRefused) {
+  const std::string out = folder_ / "out";
+  ASSERT_EQ(gapfarm_command({"init", GAPFARM_SOURCE_DIR "/configs/rover/rover.urdf", "--out",
+                             folder_ / "rover.toml"})
+                .exit_code,
+            0);
+  const std::vector<std::vector<std::string>> wrong = {
+      {"plan", folder_ / "rover.toml", "--limit", "v=1", "--limit", "omega=1", "--trials", "40"},
+      {"plan", GAPFARM_SOURCE_DIR "/configs/demo.toml", "--want", "separation=1%"},
+      {"export", "ros", folder_ / "rover.toml", "--samples", "3"}};
+  for (std::vector<std::string> arguments : wrong) {
+    arguments.insert(arguments.end(), {"--out", out});
+    const Finished refused = gapfarm_command(arguments);
+    EXPECT_EQ(refused.exit_code, 2) << arguments[1];
+    EXPECT_THAT(refused.err, HasSubstr("; omit it")) << arguments[1];
+    EXPECT_FALSE(std::filesystem::exists(out));
+  }
+}
+
 }  // namespace gapfarm::cli_overwrite_test

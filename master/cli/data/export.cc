@@ -245,21 +245,11 @@ Result<int> export_ros(ExportCommand& command, CliContext& context) {
   return kExitDone;
 }
 
-// Of options that one tool alone has.
-Status check_options_of(const std::string& tool, const CLI::App& app) {
-  constexpr std::pair<const char*, const char*> kOf[] = {{"--controllers", "ros"},
-                                                         {"--urdf", "ros"},
-                                                         {"--samples", "ranges"},
-                                                         {"--seed", "ranges"},
-                                                         {"--trials", "runs"}};
-  for (const auto& [option, of] : kOf) {
-    if (tool != of && app.count(option) > 0) {
-      return Error{std::string(option) + " is of export " + of + ", not of export " + tool +
-                   "; omit it"};
-    }
-  }
-  return {};
-}
+constexpr OptionOf kExportOptions[] = {{"--controllers", "export ros"},
+                                       {"--urdf", "export ros"},
+                                       {"--samples", "export ranges"},
+                                       {"--seed", "export ranges"},
+                                       {"--trials", "export runs"}};
 
 }  // namespace
 
@@ -294,7 +284,7 @@ SubcommandRun setup_export(CLI::App& app) {
       "  gapfarm export ranges run/husky --samples 100 --seed 1 --out ranges\n"
       "  gapfarm export runs run/husky --trials tuesday --out foxglove");
   return [command, &app](CliContext& context) -> Result<int> {
-    RETURN_IF_ERROR(check_options_of(command->format, app));
+    RETURN_IF_ERROR(check_options_of("export " + command->format, kExportOptions, app));
     if (context.dry_run && command->format != "runs") {
       context.console.result("dry run: nothing was fitted or written\nwould export " +
                                  command->format + " of " + command->source + "\n",

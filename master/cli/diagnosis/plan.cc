@@ -32,6 +32,15 @@ struct PlanOptions : LongOptions {
   DriveOptions drive;  // of a ground robot
 };
 
+constexpr const char* kOfTrials = "a plan of single trials";
+constexpr const char* kOfDrive = "a ground robot's drive";
+constexpr OptionOf kPlanOptions[] = {
+    {"--trials", kOfTrials}, {"--effects", kOfTrials}, {"--sessions", kOfTrials},
+    {"--chain", kOfTrials},  {"--levels", kOfTrials},  {"--durations", kOfTrials},
+    {"--pool", kOfTrials},   {"--keep", kOfTrials},    {"--seconds", kOfDrive},
+    {"--want", kOfDrive},    {"--limit", kOfDrive},
+};
+
 struct PlannedPlace {
   double length_m, width_m;
 };
@@ -147,13 +156,15 @@ Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& conf
   return plan::design_plan(*asked, config, options.settings, context.work->hooks());
 }
 
-Result<int> run_plan(PlanOptions& options, CliContext& context) {
+Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& context) {
   ASSIGN_OR_RETURN(Source source, read_source(options.source));
+  const bool of_drive = source.config.problem.ground != nullptr;
+  RETURN_IF_ERROR(check_options_of(of_drive ? kOfDrive : kOfTrials, kPlanOptions, app));
   // What a correction would shift is no part of what effects do: it takes none along.
   source.config.problem.residual = {};
   options.outputs.reads(options.source);
   options.outputs.reads(source.config);
-  if (source.config.problem.ground) {
+  if (of_drive) {
     DriveTask task{options.source, options.out, options.picture};
     task.seed = options.settings.seed;
     if (!options.place.empty()) {
@@ -226,7 +237,7 @@ SubcommandRun setup_plan(CLI::App& app) {
       "  gapfarm plan configs/srv1.toml --trials 120 --place 2x2 --out plan.csv\n"
       "  gapfarm plan run/demo/model.toml --effects floor_tilt,motor_asymmetry --out plan.csv "
       "--picture plan.svg");
-  return [options](CliContext& context) { return run_plan(*options, context); };
+  return [options, &app](CliContext& context) { return run_plan(*options, app, context); };
 }
 
 }  // namespace gapfarm

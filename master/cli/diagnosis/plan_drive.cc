@@ -283,6 +283,8 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
                          {{"out", task.out}, {"seconds", options.seconds}}, {}, config.farm,
                          context);
   }
+  context.begun = true;
+  context.console.progress(fmt::format("planning {:.0f} s of driving", options.seconds));
   ASSIGN_OR_RETURN(DrivePlan drive, plan::plan_drive(robot, noise, settings));
   std::vector<NamedWidths> others;
   settings.random = true;

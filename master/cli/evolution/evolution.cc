@@ -149,6 +149,7 @@ Status EvolutionOptions::complete() {
 
 Result<int> begin_run(const std::string& out, const Config& config, const EvolutionOptions& options,
                       const EvolutionOverrides& overrides, Log& log, CliContext& context) {
+  if (context.stop.requested()) return kExitSignalBase + context.stop.signal();
   std::error_code ignored;
   const bool folder_was_there = std::filesystem::exists(out, ignored);
   ASSIGN_OR_RETURN(RunStore store, RunStore::create(out, run_info(config, overrides)));

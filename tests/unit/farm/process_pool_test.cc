@@ -146,6 +146,19 @@ TEST(Stop, ASecondSigtermAtOnceIsTheSameRequest) {
   EXPECT_EQ(stop.requests(), 2u);
 }
 
+TEST(StopDeathTest, ASignalThatNobodyLooksForEndsTheProcess) {
+  const auto interrupt = [](bool heeded, int times) {
+    StopSource stop;
+    const StopOnSignals signals(&stop, StopOnSignals::kSecondEnds);
+    if (heeded) static_cast<void>(stop.requested());
+    for (int i = 0; i < times; ++i) raise(SIGINT);
+    _exit(0);
+  };
+  EXPECT_EXIT(interrupt(false, 1), testing::ExitedWithCode(128 + SIGINT), "");
+  EXPECT_EXIT(interrupt(true, 1), testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(interrupt(true, 2), testing::ExitedWithCode(128 + SIGINT), "");
+}
+
 TEST(Stop, ASignalMakesTheDescriptorReadable) {
   StopSource stop;
   const StopOnSignals signals(&stop);
