@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 namespace gapfarm {
@@ -20,9 +22,9 @@ bool colour_wanted() {
   return !(no_color && *no_color) && !dumb_terminal();
 }
 
-void write_whole(std::FILE* file, std::string_view text) {
-  std::fwrite(text.data(), 1, text.size(), file);
-  std::fflush(file);
+// False: not all of it was taken, as errno says.
+bool write_whole(std::FILE* file, std::string_view text) {
+  return std::fwrite(text.data(), 1, text.size(), file) == text.size() && std::fflush(file) == 0;
 }
 
 }  // namespace
@@ -45,6 +47,10 @@ void Console::result(std::string_view text, const Json& value) {
 }
 
 int Console::end(int exit_code) {
+  if (!lost_.empty()) {
+    error({"stdout: cannot be written: " + lost_});
+    return exit_code == kExitDone ? kExitFailed : exit_code;
+  }
   if (!json_ || printed_ || exit_code == 0) return exit_code;
   const std::string message = !errors_.empty()  ? errors_
                               : exit_code > 128 ? "stopped by a signal"
@@ -56,7 +62,7 @@ int Console::end(int exit_code) {
 void Console::print(std::string_view text) {
   clear_progress();
   printed_ = true;
-  write_whole(out_, text);
+  if (!write_whole(out_, text)) lost_ = std::strerror(errno);
 }
 
 Status Console::keep(const std::string& file) {

@@ -31,7 +31,8 @@ class Console {
   // What came of a command, once: the text, or with --json the value.
   void result(std::string_view text, const Json& value);
   // To be called last: with --json, where no result was shown, {"error": {"message", "exit_code"}}
-  // with all that error() was given.  Returns `exit_code`.
+  // with all that error() was given.  Returns `exit_code`, but kExitFailed for kExitDone where
+  // stdout did not take all that was printed.
   int end(int exit_code);
 
   // To stdout, as it is and at once.
@@ -76,6 +77,7 @@ class Console {
   bool json_ = false;
   bool printed_ = false;
   std::string errors_;
+  std::string lost_;  // why stdout did not take something
   Log* log_ = nullptr;
   std::unique_ptr<Log> kept_;
   double last_progress_s_ = -1;

@@ -52,4 +52,19 @@ TEST_F(ConsoleTest, ShowsNoErrorBehindAResult) {
   EXPECT_EQ(Json::parse(printed()), Json({{"same", false}}));
 }
 
+TEST_F(ConsoleTest, FailsWhereItsResultIsNotTaken) {
+  std::FILE* full = std::fopen("/dev/full", "w");
+  ASSERT_NE(full, nullptr);
+  {
+    Console console(full, err_);
+    console.result("two trials\n", {{"trials", 2}});
+    EXPECT_EQ(console.end(kExitDone), kExitFailed);
+    console.print("more\n");
+    EXPECT_EQ(console.end(kExitQuarantined), kExitQuarantined);
+  }
+  std::fclose(full);
+  std::swap(out_, err_);
+  EXPECT_THAT(printed(), testing::StartsWith("gapfarm: stdout: cannot be written: No space"));
+}
+
 }  // namespace gapfarm::console_test
