@@ -29,9 +29,19 @@ def _with_units(table: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
     return table
 
 
-def read_table(file: Path, **options: Any) -> pd.DataFrame:
-    """A CSV as pandas reads it, but numbers to the last digit: its own parser rounds them."""
-    return pd.read_csv(file, float_precision="round_trip", **options)
+def read_table(file: Path) -> pd.DataFrame:
+    """A CSV as pandas reads it, but numbers to the last digit, names as they are ("007", "NA"), and
+    '#' is a comment only in lines before the header, as gapfarm has it."""
+    with open(file, encoding="utf-8-sig", newline="") as text:
+        marks = 0
+        while is_comment(text.readline()):
+            marks += 1
+    names: Any = dict.fromkeys(("session", "run", "command"), str)
+    return pd.read_csv(file, float_precision="round_trip", skiprows=marks, converters=names)
+
+
+def is_comment(line: str) -> bool:
+    return line.startswith("# log:") or (line.startswith("#") and "," not in line)
 
 
 def read_trials(file: Path) -> pd.DataFrame:
@@ -41,7 +51,7 @@ def read_trials(file: Path) -> pd.DataFrame:
     start pose x0, y0 (m), theta0 (rad), end pose x1, y1 (m), theta1 (rad), and further columns as the
     file has them. Nothing is checked: `gapfarm check` says what is wrong with a log.
     """
-    table = read_table(file, comment="#", dtype={"session": str, "command": str})
+    table = read_table(file)
     return _with_units(table, TRIAL_UNITS)
 
 
@@ -58,7 +68,7 @@ def read_paths(file: Path) -> pd.DataFrame:
 
     session, trial, t (s since the command began), x, y (m), theta (rad) in the world.
     """
-    table = read_table(file, comment="#", dtype={"session": str})
+    table = read_table(file)
     return _with_units(table, PATH_UNITS)
 
 
@@ -70,7 +80,7 @@ def read_windows(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     """
     tables = []
     for name in ("commands.csv", "poses.csv"):
-        table = read_table(os.path.join(folder, name), comment="#", dtype={"run": str})
+        table = read_table(os.path.join(folder, name))
         tables.append(_with_units(table, PATH_UNITS))
     return tables[0], tables[1]
 

@@ -74,7 +74,7 @@ class Model:
             out = os.path.join(folder, "predictions.csv")
             words = ["predict", self.path, "--trials", *files, "--out", out]
             command(words + ([] if workers is None else ["--workers", str(workers)]))
-            table = read_table(out, dtype={"session": str})
+            table = read_table(out)
         table.attrs["units"] = dict(_UNITS)
         return table
 

@@ -36,8 +36,9 @@ def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
     ``progress`` is called with every line of notes and progress as it comes.  Raises GapfarmError
     with what gapfarm printed and its exit code; exit code 3 (done, but tasks were given up) is no error.
     """
+    program = _program()
     process = subprocess.Popen(
-        [_program(), *map(str, words), "--json"],
+        [program, *map(str, words), "--json"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         stdin=subprocess.DEVNULL,
@@ -74,7 +75,8 @@ def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
         raise GapfarmError("\n".join(printed) or output, exit_code or 1) from None
     if exit_code not in (0, 3):
         error = result.get("error", {}) if isinstance(result, dict) else {}
-        raise GapfarmError(error.get("message", "\n".join(printed[-3:])), exit_code)
+        said = error.get("message", "\n".join(printed[-3:]))
+        raise GapfarmError(said or f"{program} ended with {exit_code}", exit_code)
     return result
 
 

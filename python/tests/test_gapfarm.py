@@ -212,6 +212,16 @@ def test_paths_come_with_a_simulated_log(run):
     pd.testing.assert_frame_equal(trials, run.model.simulate(*words, seed=3))
 
 
+def test_names_of_a_log_are_read_as_they_are(tmp_path):
+    log = tmp_path / "log.csv"
+    rows = "\n".join(f"{name},0,,forward,1,1,0.5,0,0,0,0.1,0,0,#2" for name in ("bot#1", "NA", "007"))
+    log.write_text(f"# log: {log.name}\n#\n{','.join(gapfarm.read_trials(LOG))},note\n{rows}\n")
+    trials = gapfarm.read_trials(log)
+    assert list(trials.session) == ["bot#1", "NA", "007"]
+    assert list(trials.note) == ["#2"] * 3
+    assert trials.t.isna().all() and list(trials.x1) == [0.1] * 3
+
+
 def test_windows_go_out_and_in_again(tmp_path):
     t = np.arange(5) * 0.1
     commands = pd.DataFrame({"run": "007", "t": t, "left": 0.1 + t / 3, "right": 0.2})
