@@ -37,11 +37,15 @@ std::string remarks(const ParameterRow& row) {
 HtmlRow parameter_row(const ParameterRow& row) {
   const std::string after =
       row.choice.empty() ? value_with_unit(row.after, row.unit) : html_escaped(row.choice);
+  const std::string before = !row.choice_before.empty() ? html_escaped(row.choice_before)
+                             : row.before && row.choice.empty()
+                                 ? value_with_unit(*row.before, row.unit)
+                                 : "–";
   const std::string between =
       row.choice.empty() ? number_text(row.lower) + " to " + number_text(row.upper) : "";
   return {
       "<code>" + html_escaped(row.key) + "</code><small>" + html_escaped(row.summary) + "</small>",
-      {row.before ? value_with_unit(*row.before, row.unit) : "–", "<strong>" + after + "</strong>",
+      {before, "<strong>" + after + "</strong>",
        row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",
        bounds_svg(row) + "<small>" + between + "</small>", remarks(row)}};
 }

@@ -42,19 +42,6 @@ PredictedLogEnd predicted(const PredictionOfLog* prediction, std::size_t trial,
           p.log_score()};
 }
 
-ParameterRow row_of(const Problem& problem, const Gene& gene, double before, double after,
-                    std::vector<double> last) {
-  const Parameter& p = problem.table()[gene.row];
-  ParameterRow row{p.key, p.unit, p.effect,   p.summary,  before, after,
-                   {},    {},     gene.lower, gene.upper, "",     ""};
-  if (!p.choices.empty()) row.choice = p.choices[static_cast<std::size_t>(after)];
-  if (p.choices.empty() && last.size() >= 4) {
-    row.lo = quantile(last, 0.05);
-    row.hi = quantile(last, 0.95);
-  }
-  return row;
-}
-
 std::vector<ParameterRow> parameter_rows(const Problem& problem,
                                          const std::vector<StoredIndividual>& last,
                                          const StoredIndividual& best) {
@@ -66,8 +53,14 @@ std::vector<ParameterRow> parameter_rows(const Problem& problem,
       if (individual.genome.size() != problem.genes.size()) continue;
       values.push_back(problem.values_of(individual.genome)[gene.row]);
     }
-    rows.push_back(
-        row_of(problem, gene, problem.values[gene.row], after[gene.row], std::move(values)));
+    ParameterRow& row = rows.emplace_back(
+        row_of(problem.table()[gene.row], problem.values[gene.row], after[gene.row]));
+    row.lower = gene.lower;
+    row.upper = gene.upper;
+    if (row.choice.empty() && values.size() >= 4) {
+      row.lo = quantile(values, 0.05);
+      row.hi = quantile(values, 0.95);
+    }
   }
   return rows;
 }

@@ -47,13 +47,6 @@ std::vector<ParameterCorrelation> correlations_of(const ParameterTable& table, c
   return all;
 }
 
-ParameterRow row_of(const Parameter& p, double before, double after) {
-  ParameterRow row{p.key, p.unit, p.effect, p.summary, {}, after, {}, {}, p.lower, p.upper, "", ""};
-  if (p.effect.empty()) row.before = before;
-  if (!p.choices.empty()) row.choice = p.choices[static_cast<std::size_t>(after)];
-  return row;
-}
-
 // Places are reported in the world, not in the log's own frame.
 void to_world(double frame, ParameterRow* row) {
   for (double* value : {&row->after, &row->lower, &row->upper}) *value += frame;
@@ -187,7 +180,9 @@ void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisRe
   const Study& study = refit.nested.back().study;
   Diagnosis& d = result->diagnosis;
   for (const std::size_t at : reported_rows(of, fit, d.effects)) {
-    ParameterRow row = row_of(table[at], result->tuned[at], result->final_[at]);
+    ParameterRow row = row_of(
+        table[at], table[at].effect.empty() ? std::optional(result->tuned[at]) : std::nullopt,
+        result->final_[at]);
     const auto& [lo, hi] = result->intervals[at];
     if (lo < hi) row.lo = lo, row.hi = hi;
     to_world(of.frame_of(row.key, fit.at), &row);

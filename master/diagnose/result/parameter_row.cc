@@ -4,6 +4,15 @@
 
 namespace gapfarm {
 
+ParameterRow row_of(const Parameter& p, std::optional<double> before, double after) {
+  ParameterRow row{p.key, p.unit, p.effect, p.summary, before, after,
+                   {},    {},     p.lower,  p.upper,   "",     ""};
+  const auto name = [&](double value) { return p.choices.at(static_cast<std::size_t>(value)); };
+  if (!p.choices.empty()) row.choice = name(after);
+  if (!p.choices.empty() && before) row.choice_before = name(*before);
+  return row;
+}
+
 BoundHit bound_hit(const ParameterRow& row) {
   constexpr double kNear = 1e-3;  // of the range
   const double range = row.upper - row.lower;

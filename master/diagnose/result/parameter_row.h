@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/parameters/table.h"
+
 namespace gapfarm {
 
 enum class BoundHit { kNone, kLower, kUpper };
@@ -21,7 +23,11 @@ struct ParameterRow {
   double lower = 0, upper = 0;   // what was searched between
   std::string choice;            // the value's name, where it is one of several
   std::string note;              // "the data hardly move it"; may be empty
+  std::string choice_before{};   // the name of `before`, where that is known
 };
+
+// Without an interval, over the parameter's own bounds.
+ParameterRow row_of(const Parameter& parameter, std::optional<double> before, double after);
 
 // Two parameters that make up for one another in the fit.
 struct ParameterCorrelation {
