@@ -208,6 +208,14 @@ Status write_pages(const RunStore& store, RunWatcher& watcher) {
         fmt::format("at the end of its range in [genes]: {}; a better value may lie beyond",
                     fmt::join(keys, ", ")));
   }
+  // Of the first one, which is everywhere; elites all score the same later on.
+  if (!report.generations.empty()) {
+    const RunGeneration& first = report.generations.front();
+    if (first.evaluations > 1 && first.best && first.best == first.worst &&
+        report.generations.back().best == first.best) {
+      watcher.note("all scores are the same: nothing that was searched changed them");
+    }
+  }
   return write_file_atomically((store.run() / "report.html").string(), run_html(report));
 }
 

@@ -106,6 +106,18 @@ TEST_F(LongCommands, AMistakeInACrossfitIsFoundBeforeItsWork) {
   }
 }
 
+TEST_F(LongCommands, ACrossfitWarnsOfTrialsThatItTunedOn) {
+  for (const char* train : {"session=s1", "session=s2"}) {
+    const Finished finished =
+        gapfarm_command({"crossfit", slow_, "--train", train, "--test", "session=s2",
+                         "--evaluations", "1", "--workers", "1"},
+                        environment_);
+    EXPECT_EQ(finished.exit_code, 0) << finished.err;
+    const bool warned = finished.out.find("trials were tuned on") != std::string::npos;
+    EXPECT_EQ(warned, std::string(train) == "session=s2") << finished.out;
+  }
+}
+
 // Everything that one batch of the farm holds may be at stake.
 TEST_F(LongCommands, SimulationsGoOnBesideTheirFile) {
   const auto arguments = [&](const std::string& out) {

@@ -79,6 +79,7 @@ Json to_json(const Problem& problem, const CrossfitGroup& group) {
           {"evaluations", group.tuned.evaluations},
           {"parameters", genes},
           {"sets", sets},
+          {"warnings", group.warnings},
           {"sweeps", sweeps}};
 }
 
@@ -107,6 +108,7 @@ std::string describe(const Problem& problem, const CrossfitGroup& group) {
                     1e3 * set.stay.mean_m, 1e3 * set.untuned.mean_m, 1e3 * set.tuned.mean_m, repeat,
                     1e3 * set.tuned.median_position_m, set.tuned.median_heading_rad * 180 / M_PI);
   }
+  for (const std::string& warning : group.warnings) text += "  " + warning + "\n";
   for (const Sweep& sweep : group.sweeps) {
     text += "  " + sweep.parameter + " alone (train, test mm):";
     for (const SweepPoint& p : sweep.points) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <tuple>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -103,7 +104,20 @@ class Crossfit {
     TrialLog tests;
     for (const std::vector<std::string>& filters : plan_.tests) {
       ASSIGN_OR_RETURN(const TrialLog test, select_trials(log, filters));
-      RETURN_IF_ERROR(add_set(joined(filters, " "), test, group));
+      const std::string name_of_set = joined(filters, " ");
+      RETURN_IF_ERROR(add_set(name_of_set, test, group));
+      const auto seen = std::ranges::count_if(test.trials, [&](const Trial& trial) {
+        return std::ranges::any_of(train.trials, [&](const Trial& tuned_on) {
+          return std::tie(tuned_on.session, tuned_on.trial) == std::tie(trial.session, trial.trial);
+        });
+      });
+      if (seen > 0) {
+        group.warnings.push_back(
+            name_of_set + ": " + std::to_string(seen) + " of " +
+            std::to_string(test.trials.size()) +
+            " trials were tuned on and say nothing of others; name what to tune "
+            "on with --train");
+      }
       tests.trials.insert(tests.trials.end(), test.trials.begin(), test.trials.end());
     }
     for (const std::string& key : plan_.sweeps) {

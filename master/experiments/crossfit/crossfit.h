@@ -90,6 +90,7 @@ struct CrossfitGroup {
   Tuned tuned;
   std::vector<CrossfitSet> sets;
   std::vector<Sweep> sweeps;
+  std::vector<std::string> warnings;  // a sentence a set that holds trials that were tuned on
 };
 
 // What of the plan can be seen to fail before anything is simulated: a column, a filter or a

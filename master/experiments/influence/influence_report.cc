@@ -63,6 +63,14 @@ std::string influence_text(const InfluenceReport& report, const ParameterTable& 
                         interval_text(f.morris.mean_95), distance_text(f.morris.deviation),
                         f.morris.p, f.morris.influential ? '*' : ' ');
   }
+  const auto moves = [](const FactorInfluence& f) {
+    return f.alone.influential || f.morris.influential;
+  };
+  if (std::ranges::none_of(report.factors, moves)) {
+    return text +
+           "\nnone is shown to move the path further than repeats do (5 % over all "
+           "parameters), so genes.toml is empty; more --repeats and --trajectories show more\n";
+  }
   return text + "\n* moves the path further than repeats do, at 5 % over all parameters\n";
 }
 

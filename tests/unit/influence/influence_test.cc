@@ -63,6 +63,10 @@ TEST_F(RacquetballInfluence, ReportsWhatMattersFromWhatDoesNot) {
   EXPECT_THAT(genes, HasSubstr("gravity = [5, 15]"));
   EXPECT_THAT(genes, Not(HasSubstr("sleep_linear")));
   EXPECT_TRUE(parse_config("scenario = \"racquetball\"\n" + genes, "again.toml").ok()) << genes;
+  EXPECT_THAT(influence_text(*report, table), HasSubstr("* moves the path"));
+  InfluenceReport none = *report;
+  for (FactorInfluence& f : none.factors) f.alone.influential = f.morris.influential = false;
+  EXPECT_THAT(influence_text(none, table), HasSubstr("so genes.toml is empty; more --repeats"));
   EXPECT_THAT(influence_csv(*report, table), HasSubstr("\ngravity,5,15,"));
   EXPECT_THAT(influence_page(*report, table, small(), "T"), HasSubstr("launch_speed"));
 }
