@@ -43,6 +43,7 @@ struct Parameter {
   std::string summary;
   std::vector<std::string> choices = {};  // kChoice only; the value is an index
   std::string effect = {};                // name of the effect it belongs to; empty: base
+  std::string beyond = {};                // what to do where a value has to lie beyond the bounds
 };
 
 struct Effect {

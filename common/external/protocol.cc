@@ -200,9 +200,16 @@ Result<Json> read_answer(const std::string& line, std::uint64_t id, const std::s
 }
 
 bool has_null(const Json& given) {
-  return given.is_null() || std::any_of(given.begin(), given.end(), [](const Json& value) {
-           return value.is_null() || (value.is_array() && has_null(value));
-         });
+  return given.is_null() || (given.is_array() && std::ranges::any_of(given, has_null));
+}
+
+// What stands under `key`, an array of poses or their parts; with a null in it the robot diverged.
+template <class Answer>
+Json poses_of(const Json& json, const char* key, Answer* answer) {
+  Json given = json.value(key, Json::array());
+  answer->diverged = has_null(given);
+  if (answer->diverged) answer->message = "it answered a pose of null";
+  return given;
 }
 
 // An objective's answer; what is not finite is null here.
@@ -240,6 +247,9 @@ Result<ExternalAnswer> read_value(const Json& json, const std::vector<std::strin
     answer.value = answer.values.front();
     return answer;
   }
+  if (json.contains("values") && !json.contains("value")) {
+    return wrong("answered \"values\", which [objective] minimise and maximise have to name", line);
+  }
   const Json value = json.value("value", Json("none"));
   if (value.is_null()) return without_value("it answered a value of null");
   if (!value.is_number()) return wrong("did not answer with \"value\": a number", line);
@@ -252,9 +262,8 @@ Result<ExternalAnswer> read_value(const Json& json, const std::vector<std::strin
 std::string hello_line() { return json_text(Json{{"gapfarm", kExternalProtocol}}); }
 
 Result<ExternalDeclaration> parse_declaration(const std::string& line, bool objective) {
-  ASSIGN_OR_RETURN(const Json read,
+  ASSIGN_OR_RETURN(const Json json,
                    read_object(line, "does not introduce itself with a JSON object"));
-  const Json& json = read;
   if (number_of(json, "gapfarm", 0) != kExternalProtocol) {
     return wrong("does not speak protocol " + std::to_string(kExternalProtocol) +
                      " (\"gapfarm\": 1 is missing)",
@@ -314,17 +323,12 @@ Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalReque
   const bool objective = request.declaration->objective;
   std::string not_a_number;
   ExternalAnswer answer;
-  ASSIGN_OR_RETURN(const Json read, read_answer(line, request.id, objective ? "failed" : "diverged",
+  ASSIGN_OR_RETURN(const Json json, read_answer(line, request.id, objective ? "failed" : "diverged",
                                                 objective ? &not_a_number : nullptr, &answer));
-  const Json& json = read;
   if (answer.diverged) return answer;
   if (objective) return read_value(json, request.objectives, not_a_number, line);
-  const Json given = json.value("pose", Json::array());
-  if (has_null(given)) {
-    answer.diverged = true;
-    answer.message = "it answered a pose of null";
-    return answer;
-  }
+  const Json given = poses_of(json, "pose", &answer);
+  if (answer.diverged) return answer;
   const std::vector<double> pose = numbers(given, 3);
   if (pose.empty())
     return wrong("did not answer with \"pose\": [x, y, theta] of finite numbers", line);
@@ -362,12 +366,8 @@ Result<ExternalRunAnswer> parse_answer(const std::string& line, const ExternalRu
   ExternalRunAnswer answer;
   ASSIGN_OR_RETURN(const Json json, read_answer(line, request.id, "diverged", nullptr, &answer));
   if (answer.diverged) return answer;
-  const Json given = json.value("poses", Json::array());
-  if (has_null(given)) {
-    answer.diverged = true;
-    answer.message = "it answered a pose of null";
-    return answer;
-  }
+  const Json given = poses_of(json, "poses", &answer);
+  if (answer.diverged) return answer;
   for (const Json& row : given) {
     const std::vector<double> pose = numbers(row, 3);
     if (pose.empty()) return wrong("answered poses that are no list of finite [x, y, theta]", line);

@@ -154,7 +154,7 @@ Status ParameterTable::check(std::size_t row, double value) const {
   const auto bound = [&](double at) { return close ? text_of(row, at) : format(row, at); };
   text += "between " + bound(p.lower) + " and " + bound(p.upper);
   if (close && p.unit != "-") text += " " + p.unit;
-  return Error{text};
+  return Error{text + (p.beyond.empty() ? "" : "; ") + p.beyond};
 }
 
 std::string ParameterTable::text_of(std::size_t row, double value) const {

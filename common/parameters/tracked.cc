@@ -82,6 +82,9 @@ std::vector<Parameter> tracked_rows(const TreadNumbers& own) {
                         double TreadNumbers::*at, const char* summary) {
     Parameter row = scaled(own.*at / srv1.*at, real(key, unit, lower, upper, srv1.*at, summary));
     row.nominal = own.*at;
+    row.beyond =
+        "beyond, it is another robot: measure a copy of configs/robots/srv1.toml anew, and name it "
+        "in [robot] file";
     return row;
   };
   const double wider = std::max(1.0, own.reach_m() / srv1.reach_m());

@@ -135,6 +135,10 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
   RunLog all;
   for (const std::string& folder : folders) {
     const std::filesystem::path path(folder);
+    if (std::error_code none; std::filesystem::is_regular_file(path, none)) {
+      return Error{folder + ": is a file, expected a folder with commands.csv and poses.csv; " +
+                   "`gapfarm import runs` makes one of a log"};
+    }
     ASSIGN_OR_RETURN(auto log, read_runs((path / "commands.csv").string(),
                                          (path / "poses.csv").string(), channels));
     log.wheel_channels = all.wheel_channels;

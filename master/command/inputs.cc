@@ -36,30 +36,35 @@ LogLevel level_of(FarmEvent::Kind kind) {
 
 }  // namespace
 
+Status read_log_of(const TrialOptions& trials, Config* config) {
+  Problem& problem = config->problem;
+  if (scenario_form(problem.scenario).objective) {
+    if (trials.files.empty()) return {};
+    return Error{config->path + ": scenario objective has no trials; omit --trials"};
+  }
+  if (!trials.files.empty()) config->trial_files = trials.files;
+  if (config->trial_files.empty()) {
+    return Error{config->path +
+                 (problem.windows()
+                      ? ": names no runs; add [runs] with folders = [\"FOLDER\"] or give --trials "
+                        "FOLDER"
+                      : ": names no trial files; add them to the config or give --trials FILE")};
+  }
+  if (problem.windows()) {
+    return read_problem_runs(config->trial_files, config->windows, &problem);
+  }
+  ASSIGN_OR_RETURN(problem.log, read_trial_files(config->trial_files,
+                                                 command_names(problem.commands), trials.read));
+  return {};
+}
+
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials) {
   ASSIGN_OR_RETURN(Config config, read_config(config_path));
   if (trials.needed) {
     RETURN_IF_ERROR(check_moves(config.problem.scenario, config_path));
   }
-  if (scenario_form(config.problem.scenario).objective) {
-    if (trials.files.empty()) return config;
-    return Error{config_path + ": scenario objective has no trials; omit --trials"};
-  }
-  if (!trials.files.empty()) config.trial_files = trials.files;
-  if (config.trial_files.empty()) {
-    const bool runs = config.problem.windows();
-    return Error{
-        config_path +
-        (runs ? ": names no runs; add [runs] with folders = [\"FOLDER\"] or give --trials FOLDER"
-              : ": names no trial files; add them to the config or give --trials FILE")};
-  }
-  if (config.problem.windows()) {
-    RETURN_IF_ERROR(read_problem_runs(config.trial_files, config.windows, &config.problem));
-    return config;
-  }
-  ASSIGN_OR_RETURN(
-      config.problem.log,
-      read_trial_files(config.trial_files, command_names(config.problem.commands), trials.read));
+  RETURN_IF_ERROR(read_log_of(trials, &config));
+  if (config.problem.log.files.empty()) return config;
   const v1::Problem message = to_proto(config.problem);
   ASSIGN_OR_RETURN(const Problem sound, from_proto(message));
   RETURN_IF_ERROR(check_sendable(message));

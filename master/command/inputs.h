@@ -76,6 +76,9 @@ void show_warnings(const Problem& problem, const std::vector<std::string>& runs,
 
 std::size_t count_sessions(const TrialLog& log);
 
+// Reads the log of a config: the trials or runs given, else its own.  Errors: neither names any,
+// the scenario has none, and whatever reading finds.
+Status read_log_of(const TrialOptions& trials, Config* config);
 // A config with its trials read: those given, else the config's own.  Errors: neither names any
 // file, and whatever reading either finds.
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials);

@@ -325,4 +325,17 @@ Result<std::optional<CommandRecord>> command_status(const std::filesystem::path&
   return std::optional<CommandRecord>(std::move(record));
 }
 
+Error no_run_in(const std::filesystem::path& folder) {
+  const std::string name = folder.string();
+  const auto other = command_status(folder, 0);
+  if (other && *other) {
+    return {name + ": holds no run, but what this command left, which goes on with it: " +
+            (*other)->arguments};
+  }
+  return {name +
+          ": holds no run (there is no run.sqlite); give the folder that --out named, or "
+          "start one with `gapfarm evolve CONFIG --out " +
+          name + "`"};
+}
+
 }  // namespace gapfarm

@@ -180,4 +180,8 @@ CommandRecord command_record_of(const Json& json);
 Result<std::optional<CommandRecord>> command_status(const std::filesystem::path& folder,
                                                     double now_unix_s);
 
+// Why nothing that needs a run takes this folder, and what to do: it is another command's, or
+// nobody's.
+Error no_run_in(const std::filesystem::path& folder);
+
 }  // namespace gapfarm

@@ -90,11 +90,7 @@ Json to_json(const Incident& incident) {
 Result<RunReader> RunReader::open(const std::filesystem::path& run) {
   const std::filesystem::path file = run_store_file(run);
   std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) {
-    return Error{run.string() +
-                 ": holds no run and no other long command (there is neither a run.sqlite nor a "
-                 "simulations.sqlite with one); give the folder that --out names"};
-  }
+  if (!std::filesystem::exists(file, ignored)) return no_run_in(run);
   ASSIGN_OR_RETURN(Database database, Database::open(file, Database::Mode::kQueryOnly));
   RETURN_IF_ERROR(check_run_store(database));
   ASSIGN_OR_RETURN(RunInfo info, load_run_info(database));

@@ -129,12 +129,7 @@ Status RunStore::discard(RunStore store, bool with_folder) {
 Result<RunStore> RunStore::open(const fs::path& run) {
   const fs::path file = run / "run.sqlite";
   std::error_code missing;
-  if (!fs::exists(file, missing)) {
-    return Error{
-        run.string() +
-        ": holds no run (there is no run.sqlite); start one with `gapfarm evolve CONFIG --out " +
-        run.string() + "`"};
-  }
+  if (!fs::exists(file, missing)) return no_run_in(run);
   ASSIGN_OR_RETURN(RunLock lock, RunLock::take(run));
   // Looked at before anything may be written to it: it could be another program's file.
   {

@@ -75,8 +75,8 @@ def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
         raise GapfarmError("\n".join(printed) or output, exit_code or 1) from None
     if exit_code not in (0, 3):
         error = result.get("error", {}) if isinstance(result, dict) else {}
-        said = error.get("message", "\n".join(printed[-3:]))
-        raise GapfarmError(said or f"{program} ended with {exit_code}", exit_code)
+        printed_error = error.get("message", "\n".join(printed[-3:]))
+        raise GapfarmError(printed_error or f"{program} ended with {exit_code}", exit_code)
     return result
 
 

@@ -102,6 +102,13 @@ TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {
   const std::string answers = folder_.write("d/simulations.sqlite", "");
   refused({"evolve", config_, "--trials", log_, "--out", folder_ / "d"}, answers,
           "holds a diagnosis");
+  ASSERT_EQ(gapfarm_command({"influence", config_, "--command", "forward", "--repeats", "4",
+                             "--levels", "2", "--trajectories", "4", "--out", folder_ / "i"})
+                .exit_code,
+            0);
+  refused({"resume", folder_ / "i"}, folder_ / "i/genes.toml",
+          "which goes on with it: gapfarm influence");
+  refused({"resume", folder_ / "d"}, answers, "holds no run (there is no run.sqlite)");
   const Finished nowhere =
       gapfarm_command({"diagnose", config_, "--trials", log_, "--out", "/proc/nowhere/d"});
   EXPECT_EQ(nowhere.exit_code, 2);
@@ -179,6 +186,15 @@ TEST_F(Overwrite, ResultsAreOnStandardOutputInTextOrAsJson) {
   EXPECT_EQ(usage.exit_code, 2);
   EXPECT_THAT(Json::parse(usage.out)["error"]["message"].get<std::string>(),
               HasSubstr("--wrokers"));
+}
+
+TEST_F(Overwrite, AFileIsNoFolderOfRuns) {
+  ASSERT_EQ(gapfarm_command({"init", GAPFARM_SOURCE_DIR "/configs/rover/rover.urdf", "--out",
+                             folder_ / "rover.toml"})
+                .exit_code,
+            0);
+  refused({"check", folder_ / "rover.toml", "--trials", log_}, log_,
+          "is a file, expected a folder with commands.csv and poses.csv");
 }
 
 TEST_F(Overwrite, OptionsThatWouldDoNothingAreRefused) {

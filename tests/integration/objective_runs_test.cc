@@ -10,6 +10,7 @@ namespace gapfarm::objective_runs_test {
 
 using nlohmann::json;
 using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -61,7 +62,8 @@ TEST_F(ObjectiveRuns, FindTheLeastValueAndLeaveItsModel) {
   const std::string model = text_of(folder_.path() / "run" / "model.toml");
   EXPECT_THAT(model, AllOf(HasSubstr("direction = \"minimise\""), HasSubstr("side = { value = "),
                            Not(HasSubstr("trials take"))));
-  EXPECT_THAT(text_of(folder_.path() / "run" / "report.html"), HasSubstr("Best value "));
+  EXPECT_THAT(text_of(folder_.path() / "run" / "report.html"),
+              AllOf(HasSubstr("Best value "), ContainsRegex(">left</td><td[^>]*><strong>right<")));
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "run" / "poses.svg"));
   EXPECT_EQ(gapfarm_command({"report", folder_ / "run", "--out", folder_ / "page.html"}).exit_code,
             0);
@@ -76,6 +78,13 @@ TEST_F(ObjectiveRuns, NameWhatEndedAtItsBound) {
   const Finished finished = evolve(file, "run", "60");
   ASSERT_EQ(finished.exit_code, 0) << finished.err;
   EXPECT_THAT(finished.err, HasSubstr("at the end of its range in [genes]: x;"));
+}
+
+TEST_F(ObjectiveRuns, ReportThatNothingChangedTheScore) {
+  const Finished flat = evolve(config("    answer['value'] = 7\n"), "flat", "2");
+  ASSERT_EQ(flat.exit_code, 0) << flat.err;
+  EXPECT_THAT(flat.err, HasSubstr("all scores are the same"));
+  EXPECT_THAT(evolve(config(""), "run", "2").err, Not(HasSubstr("all scores are the same")));
 }
 
 TEST_F(ObjectiveRuns, MaximiseIsMinimiseWithTheOtherSign) {
@@ -279,9 +288,11 @@ TEST_F(ObjectiveRuns, WhatNeedsTrialsRefusesInOneSentence) {
     EXPECT_THAT(finished.err, HasSubstr("scenario objective has values and a number"))
         << command[0];
   }
-  const Finished trials = gapfarm_command({"evolve", file, "--trials", file, "--out", out});
-  EXPECT_EQ(trials.exit_code, 2);
-  EXPECT_THAT(trials.err, HasSubstr("has no trials; omit --trials"));
+  for (const char* command : {"evolve", "compare"}) {
+    const Finished trials = gapfarm_command({command, file, "--trials", file, "--out", out});
+    EXPECT_EQ(trials.exit_code, 2) << command;
+    EXPECT_THAT(trials.err, HasSubstr("has no trials; omit --trials")) << command;
+  }
 }
 
 TEST_F(ObjectiveRuns, TheExampleFindsTheEndOfTheValley) {
@@ -370,6 +381,10 @@ TEST_F(ObjectiveRuns, SeveralValuesNeedTheirNamesAndNsga2) {
     EXPECT_EQ(refused.exit_code, 2) << kind.named;
     EXPECT_THAT(refused.err, HasSubstr(kind.named));
   }
+  const Finished unnamed = gapfarm_command(
+      {"check", config("    answer = {'id': task['id'], 'values': {'near': 1}}\n")});
+  EXPECT_EQ(unnamed.exit_code, 3);
+  EXPECT_THAT(unnamed.out, HasSubstr("which [objective] minimise and maximise have to name"));
 }
 
 }  // namespace gapfarm::objective_runs_test

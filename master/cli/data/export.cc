@@ -47,8 +47,10 @@ RosFriction simulated_friction(const Problem& problem, const Model& model) {
 
 Status check_ground(const Problem& problem, const std::string& source) {
   if (problem.ground) return {};
-  return Error{source + ": scenario " + problem.scenario +
-               " has no robot file whose values could go back; only ground robots have"};
+  return Error{
+      source + ": scenario " + problem.scenario +
+      " has no robot file whose values could go back; only ground robots have.  Ranges come "
+      "of any diagnosis, too: gapfarm diagnose CONFIG --out DIAGNOSIS"};
 }
 
 }  // namespace

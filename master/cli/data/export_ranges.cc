@@ -92,9 +92,8 @@ Result<int> export_ranges(ExportCommand& command, CliContext& context) {
   context.begun = true;
   RETURN_IF_ERROR(command.outputs.write_in(command.out, files));
   context.console.result(ranges_table(ranges), json);
-  context.console.note(fmt::format("wrote {} files to {}: {}{}", files.size(), command.out,
-                                   files.front().first,
-                                   files.size() > 3 ? " ... " + files.back().first : ""));
+  context.console.note(fmt::format("wrote {} files to {}: {} ... {}", files.size(), command.out,
+                                   files.front().first, files.back().first));
   return kExitDone;
 }
 

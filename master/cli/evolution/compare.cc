@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -13,7 +14,6 @@
 #include "common/problem/problem.h"
 #include "common/score/baselines.h"
 #include "common/trials/files.h"
-#include "common/trials/read.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
@@ -64,28 +64,20 @@ Result<Inputs> read_inputs(const CompareCommand& command) {
   return inputs;
 }
 
-// Reads every variant's trials; equal lists of files only once.
-Status read_trials(const TrialOptions& given, std::vector<Variant>& variants, Console& console) {
-  const Variant* before = nullptr;
+// Reads every variant's log; equal lists of files only once.
+Status read_logs(const TrialOptions& given, std::vector<Variant>& variants, Console& console) {
+  std::map<std::vector<std::string>, TrialLog> read;
   for (Variant& variant : variants) {
     Config& config = variant.config;
-    if (scenario_form(config.problem.scenario).objective && given.files.empty()) continue;
-    if (!given.files.empty()) config.trial_files = given.files;
-    if (config.trial_files.empty()) {
-      return Error{config.path + ": no trials; name them in the config or with --trials"};
+    const auto& files = given.files.empty() ? config.trial_files : given.files;
+    if (const auto before = read.find(files); before != read.end()) {
+      config.trial_files = files;
+      config.problem.log = before->second;
+      continue;
     }
-    if (config.problem.windows()) {
-      RETURN_IF_ERROR(read_problem_runs(config.trial_files, config.windows, &config.problem));
-    } else if (before != nullptr && before->config.trial_files == config.trial_files) {
-      config.problem.log = before->config.problem.log;
-    } else {
-      ASSIGN_OR_RETURN(
-          auto log,
-          read_trial_files(config.trial_files, command_names(config.problem.commands), given.read));
-      config.problem.log = std::move(log);
-      show_notes(config.problem.log, console);
-    }
-    before = &variant;
+    RETURN_IF_ERROR(read_log_of(given, &config));
+    show_notes(config.problem.log, console);
+    if (!config.problem.windows()) read[config.trial_files] = config.problem.log;
   }
   return {};
 }
@@ -176,7 +168,7 @@ Status plan_outputs(CompareCommand& command, const Inputs& inputs) {
 
 Result<int> run_compare(CompareCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(Inputs inputs, read_inputs(command));
-  RETURN_IF_ERROR(read_trials(command.trials, inputs.variants, context.console));
+  RETURN_IF_ERROR(read_logs(command.trials, inputs.variants, context.console));
   RETURN_IF_ERROR(check_alike(inputs.variants));
   RETURN_IF_ERROR(plan_outputs(command, inputs));
   add_random_search(inputs.variants);

@@ -38,15 +38,6 @@ void keep_first(std::vector<Genome>& genomes, const EvolutionSettings& settings)
   });
 }
 
-// A value as tables have it: a number, a choice's name, true or false.
-std::optional<double> value_of_text(const Parameter& row, const std::string& text) {
-  const auto choice = std::ranges::find(row.choices, text);
-  if (choice != row.choices.end()) return static_cast<double>(choice - row.choices.begin());
-  if (text == "true" || text == "True") return 1;
-  if (text == "false" || text == "False") return 0;
-  return parse_double(text);
-}
-
 class TableOfGenes {
  public:
   TableOfGenes(const std::string& path, const Config& config) : path_(path), config_(config) {}

@@ -5,38 +5,38 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
-namespace {
 
-std::vector<std::string> keys_of(const ParameterTable& table) {
-  std::vector<std::string> keys = mapped(table.rows(), &Parameter::key);
-  return keys;
+std::optional<double> value_of_text(const Parameter& row, const std::string& text) {
+  const auto choice = std::ranges::find(row.choices, text);
+  if (choice != row.choices.end()) return static_cast<double>(choice - row.choices.begin());
+  if (text == "true" || text == "True") return 1;
+  if (text == "false" || text == "False") return 0;
+  return parse_double(text);
 }
-
-}  // namespace
 
 Status apply_setting(const std::string& setting, Problem& problem, const std::string& option) {
   const ParameterTable& table = problem.table();
   const std::size_t equals = setting.find('=');
   const std::string key = setting.substr(0, equals);
-  const std::vector<std::string> known = keys_of(table);
+  const std::vector<std::string> known = mapped(table.rows(), &Parameter::key);
   const auto row = table.find(key);
   if (!row || equals == std::string::npos) {
     return Error{option + " " + setting + ": expected PARAMETER=VALUE" +
                  (row ? "" : ", and there is no parameter '" + key + "'" + suggestion(key, known))};
   }
   const std::string text = setting.substr(equals + 1);
-  const std::vector<std::string>& choices = table[*row].choices;
-  const auto choice = std::ranges::find(choices, text);
-  double value = static_cast<double>(choice - choices.begin());
-  if (choice == choices.end() && !CLI::detail::lexical_cast(text, value)) {
+  const auto value = value_of_text(table[*row], text);
+  if (!value) {
+    const std::vector<std::string>& choices = table[*row].choices;
     return Error{option + " " + setting + ": '" + text + "' is not a number" +
                  (choices.empty() ? "" : suggestion(text, choices))};
   }
-  if (Status s = table.check(*row, value); !s)
+  if (Status s = table.check(*row, *value); !s)
     return Error{option + " " + setting + ": " + s.error().message};
-  problem.values[*row] = value;
+  problem.values[*row] = *value;
   return {};
 }
 
@@ -50,7 +50,7 @@ Status apply_genes(const std::vector<std::string>& genes, Problem& problem,
     const auto row = table.find(key);
     if (!row) {
       return Error{option + " " + text + ": there is no parameter '" + key + "'" +
-                   suggestion(key, keys_of(table))};
+                   suggestion(key, mapped(table.rows(), &Parameter::key))};
     }
     Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
     if (equals != std::string::npos) {

@@ -1,6 +1,7 @@
 // Parameters on the command line.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,9 @@
 #include "common/problem/problem.h"
 
 namespace gapfarm {
+
+// A value as tables and command lines have it: a number, a choice's name, true or false.
+std::optional<double> value_of_text(const Parameter& row, const std::string& text);
 
 // "battery_sag.rate=0.01", "robot=wheels" into the problem's values.  Errors: no such parameter, a
 // value that it does not accept; they name the option.

@@ -232,8 +232,10 @@ TEST(Config, RefusesWrongTypes) {
 }
 
 TEST(Config, RefusesWhatIsOutOfRange) {
-  EXPECT_EQ(error_of("[parameters]\nmass = 35\n"),
-            "c.toml:2:8: mass is 35, but it must be between 0.1 kg and 1.5 kg");
+  EXPECT_THAT(
+      error_of("[parameters]\nmass = 35\n"),
+      AllOf(StartsWith("c.toml:2:8: mass is 35, but it must be between 0.1 kg and 1.5 kg; "),
+            HasSubstr("name it in [robot] file")));
   EXPECT_THAT(error_of("[parameters]\nmass = nan\n"), StartsWith("c.toml:2:8: mass is nan"));
   EXPECT_THAT(error_of("[genes]\nmass = [0.2, 20]\n"), StartsWith("c.toml:2:14: mass is 20, but"));
   EXPECT_THAT(error_of("[genes]\nmass = [0.5, 0.5]\n"),
@@ -268,10 +270,10 @@ TEST(Config, RefusesWhatDoesNotFitTogether) {
 }
 
 TEST(Config, ListsEveryMistakeInTheFilesOrder) {
-  EXPECT_EQ(error_of("sed = 1\n[farm]\nwindow = 0\n[parameters]\nmass = 9\n"),
+  EXPECT_EQ(error_of("sed = 1\n[farm]\nwindow = 0\n[parameters]\nfriction = 90\n"),
             "c.toml:1:1: unknown key 'sed'; did you mean 'seed'?\n"
             "c.toml:3:10: window is 0, expected an integer in [1, 1024]\n"
-            "c.toml:5:8: mass is 9, but it must be between 0.1 kg and 1.5 kg");
+            "c.toml:5:12: friction is 90, but it must be between 0.02 and 2");
 }
 
 TEST(Config, NamesWhatIsNotAConfig) {
