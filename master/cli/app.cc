@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <iostream>
 #include <sstream>
 
 #include "common/base/build_info.h"
@@ -99,7 +98,7 @@ int answer_parse_error(const CLI::App& app, const CLI::ParseError& error, Consol
     console.error({(is_command ? "unknown command '" : "did not expect '") + word + "'" +
                    did_you_mean(at, word)});
   } else if (&at == &app) {
-    std::cerr << app.help();
+    console.note(app.help());
     return kExitBadUsage;
   } else {
     console.error({usage_sentence(at, error)});

@@ -49,8 +49,6 @@ void report_to(Log& log, SocketFarmOptions& options);
 // Lets `options` report what went wrong to the user, and all events to the console's kept file.
 void report_to(Console& console, SocketFarmOptions& options);
 
-class Console;
-
 struct TrialOptions {
   std::vector<std::string> files;
   ReadOptions read;

@@ -18,8 +18,6 @@
 
 namespace gapfarm {
 
-struct CliContext;
-
 // What this process was called with: "gapfarm diagnose ...".
 std::string command_line();
 
