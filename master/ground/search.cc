@@ -140,16 +140,39 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
   search->moved = chosen.moved;
 }
 
-// Of candidates that predict as well as the chosen one with 95 % confidence, and gain nearly as
-// much, the first of the catalogue, where simple words come first.
-const Candidate& simplest_of(const WindowSet& windows, const GroundWork& work,
+bool frees_part_of(const GroundHypothesis& part, const GroundHypothesis& whole) {
+  const auto is_in_whole = [&](const KinematicRow& row) {
+    return contains(whole.freed, row.name, &KinematicRow::name);
+  };
+  return part.freed.size() < whole.freed.size() && std::ranges::all_of(part.freed, is_in_whole);
+}
+
+// A candidate with some of the values of another one that gains no more over it than a model leaves
+// traces of is the simpler word for the same.
+const Candidate& simplest_of(const std::vector<GroundHypothesis>& catalogue,
                              const std::vector<Candidate>& candidates, const Candidate& chosen) {
-  return *std::ranges::min_element(candidates, {}, [&](const Candidate& c) {
-    const bool alike = c.may_be_named && c.moved == chosen.moved &&
-                       (1 + kTraceShare) * c.offer.gain >= chosen.offer.gain &&
-                       held_out_gain(windows, chosen.held_out, c.held_out, work.seed).lo <= 0;
-    return alike ? c.offer.hypothesis : SIZE_MAX;
-  });
+  const Candidate* simplest = &chosen;
+  for (const Candidate& c : candidates) {
+    const bool part =
+        frees_part_of(catalogue[c.offer.hypothesis], catalogue[simplest->offer.hypothesis]);
+    const bool alike = (1 + kTraceShare) * c.offer.gain >= chosen.offer.gain;
+    if (part && alike && c.may_be_named) simplest = &c;
+  }
+  return *simplest;
+}
+
+// Of candidates that predict no worse than the chosen one with 95 % confidence, the one that gains
+// clearly most where all is fitted.
+const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
+                              const std::vector<Candidate>& candidates, const Candidate& chosen) {
+  const Candidate* likeliest = &chosen;
+  for (const Candidate& c : candidates) {
+    if (c.offer.gain < likeliest->offer.gain + kNotDistinguished) continue;
+    if (!c.may_be_named || c.moved != chosen.moved) continue;
+    const HeldOutGain over = held_out_gain(windows, chosen.held_out, c.held_out, work.seed);
+    if (over.lo <= 0) likeliest = &c;
+  }
+  return *likeliest;
 }
 
 // The best of the catalogue, when it is worth its name.
@@ -212,8 +235,9 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     }
     return false;
   }
+  const Candidate& likeliest = likeliest_of(fitter.windows(), work, candidates, *chosen);
   name_candidate(fitter.windows(), work, offers, candidates,
-                 simplest_of(fitter.windows(), work, candidates, *chosen), search);
+                 simplest_of(search->catalogue, candidates, likeliest), search);
   emit_steps(work, *search);
   return true;
 }
