@@ -55,7 +55,7 @@ Explanation look_for_spreads(const DiagnosisRequest& of, Explanation partial,
     const SpreadRow* row = effect->spread;
     if (row == nullptr || row->by_session || partial.spread(row->effect) != nullptr) continue;
     if (row->after_means && !by_means) continue;
-    SpreadFit fit = row->fit(seen, left, of.outlier_share());
+    SpreadFit fit = row->fit(row->after_means ? seen : study, left, of.outlier_share());
     const double least = row->after_means ? kLeastOutlierShare * *by_means : 0;
     if (fit.gain < std::max(row->least_gain, least)) continue;
     if (of.excluded(row->effect))
