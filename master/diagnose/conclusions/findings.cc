@@ -130,7 +130,16 @@ std::string effect_claim(const NamedEffect& effect, const EffectPhrases& phrases
 
 std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& effects) {
   const EffectPhrases& phrases = effects.row(effect.name).phrases;
-  std::string text = effect_claim(effect, phrases, phrases.sentence, true);
+  NamedEffect shown = effect;
+  const char* claim = phrases.sentence;
+  Estimate* first = phrases.opposite == nullptr
+                        ? nullptr
+                        : find_by(shown.parameters, phrases.parameters[0].key, &Estimate::key);
+  if (first != nullptr && first->value < 0) {
+    claim = phrases.opposite;
+    *first = {first->key, -first->value, -first->hi, -first->lo, first->unit};
+  }
+  std::string text = effect_claim(shown, phrases, claim, true);
   if (std::isfinite(effect.closed) && effect.closed > 0) {
     text += "; adding that closes " + percent(effect.closed) + " of the gap in log score";
     if (effect.position_mm_before && effect.position_mm_after && effect.heading_mrad_before &&

@@ -238,6 +238,11 @@ TEST(Findings, ReportEffectsInPlainUnits) {
   EXPECT_EQ(effect_sentence(sag(), drive_effect_diagnoses()),
             "The battery loses 0.35 % (0.31 to 0.4) of its speed a minute; adding that closes 88 % "
             "of the gap in log score.");
+  NamedEffect slower;
+  slower.name = "motor_asymmetry";
+  slower.parameters = {{"ratio", -0.067, -0.07, -0.06, "-"}};
+  EXPECT_EQ(effect_sentence(slower, drive_effect_diagnoses()),
+            "The left side runs 6.7 % (6 to 7) faster than the right.");
   NamedEffect strange;
   strange.name = "moon_phase";
   strange.parameters = {{"pull", 2, 1, 3, "N"}};
