@@ -212,20 +212,23 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     const bool enough = c.offer.gain >= least || c.held_out_gain.lo > kToleratedGap;
     c.may_be_named = enough && may_be_named(c.held_out_gain) && shown(c);
   }
-  // Held out, values that gain far less than others do with small moves of the rest do not compete.
-  double most = 0;
-  for (const Candidate& c : candidates) {
-    if (c.may_be_named) most = std::max(most, c.offer.gain);
-  }
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
     return a.held_out_gain.mean > b.held_out_gain.mean;
   });
   // What has a name needs no other one while what is left is tolerated.
   const bool further = !search->steps.empty();
-  const auto chosen = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+  std::vector<bool> competes = mapped(candidates, [&](const Candidate& c) {
     if (further && !(c.held_out_gain.hi > kToleratedGap)) return false;
-    return c.may_be_named && c.offer.gain >= kShareOfBest * most &&
-           may_be_named(gain_beyond_traces(fitter.windows(), work, *search, c));
+    return c.may_be_named && may_be_named(gain_beyond_traces(fitter.windows(), work, *search, c));
+  });
+  // Held out, values that gain far less than others do with small moves of the rest do not win.
+  double most = 0;
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    if (competes[k]) most = std::max(most, candidates[k].offer.gain);
+  }
+  const auto chosen = std::ranges::find_if(candidates, [&](const Candidate& c) {
+    return competes[&c - candidates.data()] &&
+           (!search->reference || c.offer.gain >= kShareOfBest * most);
   });
   if (chosen == candidates.end()) {
     const auto best = std::ranges::find_if(candidates, shown);

@@ -159,7 +159,7 @@ inline constexpr double kLeastRounding = 0.3;
 
 // -- Budgets.
 inline constexpr int kMostFaults = 2;
-inline constexpr int kMostSteps = 3;         // names of values
+inline constexpr int kMostSteps = 4;         // names of values
 inline constexpr int kMostCandidates = 5;    // offers of a step that are predicted held out
 inline constexpr int kLeastRunsHeldOut = 4;  // whole runs are held out; of fewer, stretches
 inline constexpr int kFolds = 5;             // of the blocks

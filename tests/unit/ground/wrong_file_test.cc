@@ -178,5 +178,18 @@ TEST(WrongFile, AnAccelerationLimitThatTheFileHasNotIsNamed) {
   EXPECT_NEAR(found.diagnosis.effects.front().parameters.at(0).value, 2, 0.05);
 }
 
+// A lag and a delay explain most, held out, but gain little in sample beside small moves of all
+// other values; the marker gains most in sample, and had the only name.
+TEST(WrongFile, AllOfFourWrongValuesAreNamed) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const RunLog log =
+      driven(robot, off_by({"separation", "lag", "delay", "marker_x"}, {1.075, 0.22, 0.08, 0.07}));
+  const GroundDiagnosis found = checked(robot, log, "four");
+  EXPECT_EQ(found.diagnosis.effects.size(), 4u) << found.diagnosis.headline;
+  for (const char* name : {"wheel_separation", "motor_lag", "command_delay", "marker_offset"}) {
+    EXPECT_TRUE(names(found, name)) << name << ": " << found.diagnosis.headline;
+  }
+}
+
 }  // namespace
 }  // namespace gapfarm
