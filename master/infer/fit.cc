@@ -249,14 +249,12 @@ Normal Fitter::normal(const Fit& fit, std::optional<std::size_t> without_fold) c
   }
   normal.matrix.diagonal() += space_.prior();
   normal.right += space_.pull(fit.u);
-  if (dimensions == 0) return normal;
   // What the data do not see stays where it is.
   normal.matrix.diagonal().array() += 1e-9 * (1 + normal.matrix.diagonal().maxCoeff());
   return normal;
 }
 
 Eigen::VectorXd Fitter::bounded_step(const Eigen::VectorXd& u, const Normal& equations) const {
-  if (u.size() == 0) return u;
   return bounded_minimum(equations.matrix, equations.right,
                          (space_.lower() - u).cwiseMax(-kLongestStep).cwiseMin(0.0),
                          (space_.upper() - u).cwiseMin(kLongestStep).cwiseMax(0.0));
@@ -340,7 +338,7 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       if (observations_.fold[i] != f || !learns_from(i, std::nullopt)) continue;
       const double squares = squares_of(left.z, static_cast<Eigen::Index>(i));
-      scores[i] = times(i) * score_of(observations_.loss, squares, left.scale);
+      scores[i] = score_of(observations_.loss, squares, left.scale);
     }
   }
   return scores;

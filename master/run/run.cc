@@ -53,7 +53,8 @@ Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const Ru
                   "{:.2f} nats a window more than with the values of the robot's own kinematics",
                   start.simulations, start.starts, start.starts == 1 ? "" : "s", start.gain));
   watcher.note(fmt::format(
-      "on stretches held out of the fit it predicts {:.2f} nats a window {} than with these{}",
+      "on stretches held out of the fit the simulation predicts {:.2f} nats a window {} than the "
+      "kinematics{}",
       std::abs(start.held_out_gain), start.held_out_gain < 0 ? "less" : "more",
       start.kinematic ? ", too little to leave the kinematics' values" : ""));
   return std::optional(std::move(start));

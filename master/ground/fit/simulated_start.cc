@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
@@ -20,24 +21,29 @@ namespace {
 using infer::Coordinate;
 using infer::Fit;
 using infer::Fitter;
-using infer::Model;
 using infer::Space;
+using Ends = std::vector<Eigen::Vector3d>;  // measured less predicted: m, m, rad
 
-constexpr double kUnit = 0.05;         // of a gene's range: of a coordinate
-constexpr double kFreelyMoves = 0.3;   // of a gene's range, where the windows do not show
-constexpr std::size_t kStretches = 6;  // held out in turn
-constexpr std::size_t kParts = 12;     // of the log, that show how sure a gain is
-constexpr std::size_t kLooks = 3;      // starts a gene that kinematics do not show
-constexpr int kClimbSteps = 40;
+constexpr double kUnit = 0.05;          // of a gene's range: of a coordinate
+constexpr double kFreelyMoves = 0.3;    // of a gene's range, where the windows do not show
+constexpr std::size_t kStretches = 6;   // held out in turn
+constexpr std::size_t kParts = 12;      // of the log, that show how sure a gain is
+constexpr std::size_t kLooks = 3;       // starts a gene that kinematics do not show
+constexpr std::size_t kBestClimbs = 2;  // of all starts, to the end
+constexpr int kRaceSteps = 4, kClimbSteps = 40;
+constexpr double kHeadingCounts = 2;  // as much as each direction of a position
+constexpr double kLeastScale = 1e-5;  // m or rad
 // What windows of one run show is less than their number says: how much more than one of them a
 // value's start counts is tried on stretches that were held out.
 constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
-constexpr double kHeadingCounts = 2;  // as much as each direction of a position
-constexpr double kLeastScale = 1e-5;  // m or rad
 // What is left to find is mostly the noise: a search that has the windows' whole spread to roam in
 // trades ends for the noise's likelihood.
 constexpr double kFoundSpread = 0.1;  // of what the windows leave unsure
 constexpr double kHeldSpread = 1e-3;
+
+double total_of(const std::vector<double>& of) {
+  return std::accumulate(of.begin(), of.end(), 0.0);
+}
 
 class SimulationFit {
  public:
@@ -45,30 +51,46 @@ class SimulationFit {
   Result<SimulatedStart> run(double widest);
 
  private:
+  // A fit, and the space that it was made in.
+  struct Climb {
+    Space space;
+    Fit fit;
+  };
+
+  // The first `kept` whatever they score, and the best of the others.
+  static void keep_best(std::size_t count, std::ptrdiff_t kept, std::vector<Climb>* climbs) {
+    std::stable_sort(climbs->begin() + kept, climbs->end(),
+                     [](const Climb& a, const Climb& b) { return a.fit.score > b.fit.score; });
+    if (climbs->size() > count)
+      climbs->erase(climbs->begin() + static_cast<std::ptrdiff_t>(count), climbs->end());
+  }
+
   Fitter fitter(const Space& space) const { return Fitter(forward_, observed_, space); }
-  std::vector<Coordinate> coordinates(const Overrides& start) const;
+  Coordinate coordinate(std::size_t gene, const Overrides& centre) const;
+  Space space(const std::vector<std::size_t>& genes, const Overrides& start) const;
   Overrides start_of(const Genome& genome) const;
+  Genome genome_at(const Climb& climb) const;
   void observe(const Kinematics& kinematics);
-  Result<std::vector<Genome>> starts(const Genome& slips, const Genome& grips) const;
-  Eigen::VectorXd whitened(const std::vector<Eigen::Vector3d>& ends) const;
-  // Weighted nats of the parts of the log.
+  Eigen::VectorXd whitened(const Ends& ends) const;
+  Result<std::vector<Climb>> climbs(const Genome& start, const Genome& firm);
+  Status follow(Climb* climb, int steps) const;
+  // Weighted nats of the parts of the log, of stretches that were held out.
   std::vector<double> by_parts(const std::vector<double>& scores) const;
-  // The same of stretches that were held out.
-  Result<std::vector<double>> held_out(const Model& model) const;
-  double hold_best(Model* model) const;
-  Result<Model> followed(Model model) const;  // to the end of its climb
-  Result<Model> contest(Model kinematic, const std::vector<Genome>& starts) const;
-  void take_spread(const Model& model, double widest, SimulatedStart* found) const;
+  Result<std::vector<double>> held_out(const Climb& climb) const;
+  double hold_best(Climb* climb) const;
+  Status judge(const Climb& best, const Genome& start, const Genome& firm, SimulatedStart* found);
+  void take_spread(const Climb& climb, double widest, SimulatedStart* found) const;
 
   const Problem& problem_;
   Predictor predictor_;
   infer::Forward forward_;
   std::size_t simulations_ = 0;
   infer::Observations observed_;
-  Eigen::VectorXd kinematic_, unseen_;  // of the kinematics: fitted to all, and held out
-  std::vector<std::size_t> fitted_;     // genes that move ends
-  std::vector<std::size_t> dynamic_;    // of them, those that kinematics have no word for
-  std::vector<std::size_t> parts_;      // of each window
+  Ends kinematic_ends_, baseline_;   // of the kinematics: fitted to all, and held out
+  std::vector<std::size_t> fitted_;  // genes that move ends
+  // Of them, those that kinematics have a word for, and the others.
+  std::vector<std::size_t> kinematic_, dynamic_;
+  std::vector<std::size_t> parts_;  // of each window
 };
 
 SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
@@ -85,24 +107,28 @@ SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
     const bool noise = row.key.find("_noise_") != std::string::npos;
     if (noise || row.kind != ParameterKind::kReal) continue;
     fitted_.push_back(g);
-    if (!kinematic[g]) dynamic_.push_back(g);
+    (kinematic[g] ? kinematic_ : dynamic_).push_back(g);
   }
 }
 
-std::vector<Coordinate> SimulationFit::coordinates(const Overrides& start) const {
-  return mapped(fitted_, [&](std::size_t g) {
-    const Gene& gene = problem_.genes[g];
-    const bool log = gene.scale == ParameterScale::kLog;
-    const auto of = [log](double value) { return log ? std::log(value) : value; };
-    Coordinate c;
-    c.kind = log ? Coordinate::Kind::kLogarithm : Coordinate::Kind::kLinear;
-    c.row = gene.row;
-    c.size = kUnit * (of(gene.upper) - of(gene.lower));
-    c.within = Interval{gene.lower, gene.upper};
-    c.prior_sd = kFreelyMoves / kUnit;
-    c.centre = of(start.at(gene.row)) / c.size;
-    return c;
-  });
+Coordinate SimulationFit::coordinate(std::size_t g, const Overrides& centre) const {
+  const Gene& gene = problem_.genes[g];
+  const bool log = gene.scale == ParameterScale::kLog;
+  const auto of = [log](double value) { return log ? std::log(value) : value; };
+  Coordinate c;
+  c.kind = log ? Coordinate::Kind::kLogarithm : Coordinate::Kind::kLinear;
+  c.row = gene.row;
+  c.size = kUnit * (of(gene.upper) - of(gene.lower));
+  c.within = Interval{gene.lower, gene.upper};
+  c.prior_sd = kFreelyMoves / kUnit;
+  c.centre = of(centre.at(gene.row)) / c.size;
+  return c;
+}
+
+// Genes that are none of these stand where they start.
+Space SimulationFit::space(const std::vector<std::size_t>& genes, const Overrides& start) const {
+  return Space(problem_.table(), mapped(genes, [&](std::size_t g) { return coordinate(g, start); }))
+      .holding(start);
 }
 
 Overrides SimulationFit::start_of(const Genome& genome) const {
@@ -114,17 +140,23 @@ Overrides SimulationFit::start_of(const Genome& genome) const {
   return at;
 }
 
+Genome SimulationFit::genome_at(const Climb& climb) const {
+  const Overrides at = climb.space.values(climb.fit.u);
+  return mapped(problem_.genes, [&](const Gene& gene) {
+    return encode_gene(problem_.table(), gene, value_at(problem_, at, gene.row));
+  });
+}
+
 // Windows, each length scaled by what the kinematics leave of it.
 void SimulationFit::observe(const Kinematics& kinematics) {
   const std::vector<Trial>& trials = problem_.log.trials;
   const std::vector<Pose> ends = kinematic_ends(problem_, kinematics);
   const auto lengths = window_lengths(mapped(trials, [](const Trial& t) { return *t.duration_s; }));
   std::vector<std::array<std::vector<double>, 2>> sizes(1 + std::ranges::max(lengths));
-  std::vector<Eigen::Vector3d> missed;
   for (std::size_t i = 0; i < trials.size(); ++i) {
-    missed.push_back(local_difference(ends[i], trials[i].X_WE));
-    sizes[lengths[i]][0].push_back(missed[i].head<2>().norm() / std::sqrt(2.0));
-    sizes[lengths[i]][1].push_back(std::abs(missed[i][2]));
+    kinematic_ends_.push_back(local_difference(ends[i], trials[i].X_WE));
+    sizes[lengths[i]][0].push_back(kinematic_ends_[i].head<2>().norm() / std::sqrt(2.0));
+    sizes[lengths[i]][1].push_back(std::abs(kinematic_ends_[i][2]));
   }
   observed_.measured = mapped(trials, &Trial::X_WE);
   observed_.weight = window_weights(lengths);
@@ -137,16 +169,48 @@ void SimulationFit::observe(const Kinematics& kinematics) {
     const Eigen::Vector3d scales(scale(0), scale(0), scale(1) / std::sqrt(kHeadingCounts));
     observed_.whitener.emplace_back(scales.cwiseInverse().asDiagonal());
   }
-  kinematic_ = whitened(missed);
-  unseen_ = whitened(kinematic_held_out(problem_, kinematics, observed_.fold));
+  baseline_ = kinematic_held_out(problem_, kinematics, observed_.fold);
 }
 
-Eigen::VectorXd SimulationFit::whitened(const std::vector<Eigen::Vector3d>& ends) const {
+Eigen::VectorXd SimulationFit::whitened(const Ends& ends) const {
   Eigen::VectorXd z(static_cast<Eigen::Index>(3 * ends.size()));
   for (std::size_t i = 0; i < ends.size(); ++i) {
     z.segment<3>(static_cast<Eigen::Index>(3 * i)) = observed_.whitener[i] * ends[i];
   }
   return z;
+}
+
+// From the kinematics' values first; no others where that cannot be simulated.
+Result<std::vector<SimulationFit::Climb>> SimulationFit::climbs(const Genome& start,
+                                                                const Genome& firm) {
+  std::vector<Genome> from = {start};
+  if (dynamic_.size() >= 2) {
+    for (Genome& g : spread_starts(start, dynamic_, kLooks * dynamic_.size())) {
+      from.push_back(std::move(g));
+    }
+  }
+  std::vector<Space> spaces =
+      mapped(from, [&](const Genome& g) { return space(fitted_, start_of(g)); });
+  std::vector<Eigen::VectorXd> points;
+  for (std::size_t k = 0; k < from.size(); ++k) points.push_back(spaces[k].from(start_of(from[k])));
+  ASSIGN_OR_RETURN(const auto fits, fitter(spaces.front()).starts(points, spaces));
+  std::vector<Climb> all;
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    if (!std::isfinite(fits[k].score)) continue;
+    all.push_back({spaces[k], fitter(spaces[k]).known(points[k], fits[k].z)});
+  }
+  const Space grips = space(kinematic_, start_of(firm));
+  ASSIGN_OR_RETURN(auto fit, fitter(grips).start(grips.from(start_of(firm))));
+  all.push_back({grips, std::move(fit)});
+  if (!std::isfinite(fits.front().score)) all.clear();
+  return all;
+}
+
+Status SimulationFit::follow(Climb* climb, int steps) const {
+  const Fitter fits = fitter(climb->space);
+  RETURN_IF_ERROR(fits.improve(&climb->fit, steps));
+  if (climb->fit.fresh || !std::isfinite(climb->fit.score)) return {};
+  return fits.differentiate(&climb->fit);
 }
 
 std::vector<double> SimulationFit::by_parts(const std::vector<double>& scores) const {
@@ -157,41 +221,17 @@ std::vector<double> SimulationFit::by_parts(const std::vector<double>& scores) c
   return sums;
 }
 
-// The kinematics' values with and without slip, the better first; none where neither can be
-// simulated.  Behind them the best of some others.
-Result<std::vector<Genome>> SimulationFit::starts(const Genome& slips, const Genome& grips) const {
-  std::vector<Genome> from = {slips, grips};
-  if (dynamic_.size() >= 2) {
-    for (Genome& g : spread_starts(slips, dynamic_, kLooks * dynamic_.size())) {
-      from.push_back(std::move(g));
-    }
-  }
-  const auto spaces = mapped(
-      from, [&](const Genome& g) { return Space(problem_.table(), coordinates(start_of(g))); });
-  std::vector<Eigen::VectorXd> points;
-  for (std::size_t k = 0; k < from.size(); ++k) points.push_back(spaces[k].from(start_of(from[k])));
-  ASSIGN_OR_RETURN(const auto fits, fitter(spaces.front()).starts(points, spaces));
-  std::vector<std::size_t> order = indices(from.size());
-  const auto better = [&](std::size_t a, std::size_t b) { return fits[a].score > fits[b].score; };
-  std::stable_sort(order.begin(), order.begin() + 2, better);
-  std::stable_sort(order.begin() + 2, order.end(), better);
-  order.resize(std::min(order.size(), 2 + dynamic_.size() / 2));
-  if (!std::isfinite(fits[order[0]].score)) order.clear();
-  std::erase_if(order, [&](std::size_t k) { return !std::isfinite(fits[k].score); });
-  return mapped(order, [&](std::size_t k) { return from[k]; });
-}
-
 // By simulations at the values that fit the other stretches: where contacts begin to slip the first
 // order promises too much.
-Result<std::vector<double>> SimulationFit::held_out(const Model& model) const {
-  const Fitter fits = fitter(model.space);
+Result<std::vector<double>> SimulationFit::held_out(const Climb& climb) const {
+  const Fitter fits = fitter(climb.space);
   std::vector<Eigen::VectorXd> points;
   for (std::size_t f = 0; f <= std::ranges::max(observed_.fold); ++f) {
-    points.push_back(fits.linear_step(model.fit, f).u);
+    points.push_back(fits.linear_step(climb.fit, f).u);
   }
   ASSIGN_OR_RETURN(const auto there,
-                   fits.starts(points, std::vector<Space>(points.size(), model.space)));
-  Eigen::VectorXd z = model.fit.z;
+                   fits.starts(points, std::vector<Space>(points.size(), climb.space)));
+  Eigen::VectorXd z = climb.fit.z;
   for (std::size_t i = 0; i < observed_.size(); ++i) {
     const Fit& of = there[observed_.fold[i]];
     const auto at = static_cast<Eigen::Index>(3 * i);
@@ -201,63 +241,74 @@ Result<std::vector<double>> SimulationFit::held_out(const Model& model) const {
 }
 
 // Held to where it began as firmly as predicts best what was held out; the nats of that.
-double SimulationFit::hold_best(Model* model) const {
-  const std::vector<Coordinate> begun = model->space.all();
+double SimulationFit::hold_best(Climb* climb) const {
+  const std::vector<Coordinate> begun = climb->space.all();
   double most = -INFINITY;
   for (const double hold : kHolds) {
-    const Space held = model->space.only(mapped(begun, [&](Coordinate c) {
+    const Space held = climb->space.only(mapped(begun, [&](Coordinate c) {
       c.prior_sd /= std::sqrt(hold);
       return c;
     }));
-    const std::vector<double> scores = fitter(held).held_out(model->fit);
-    const double nats = std::accumulate(scores.begin(), scores.end(), 0.0);
+    const double nats = total_of(by_parts(fitter(held).held_out(climb->fit)));
     if (!(nats > most)) continue;
     most = nats;
-    model->space = held;
+    climb->space = held;
   }
-  model->fit.score = fitter(model->space).known(model->fit.u, model->fit.z).score;
-  model->fit.settled = false;
+  climb->fit.score = fitter(climb->space).known(climb->fit.u, climb->fit.z).score;
+  climb->fit.settled = false;
   return most;
 }
 
-Result<Model> SimulationFit::followed(Model model) const {
-  RETURN_IF_ERROR(fitter(model.space).improve(&model.fit, kClimbSteps));
-  return infer::model_of(forward_, observed_, std::move(model.space), std::move(model.fit));
-}
-
-// The best of the finalists, held so and followed to its end; the kinematics' where nobody gains.
-Result<Model> SimulationFit::contest(Model kinematic, const std::vector<Genome>& starts) const {
-  const auto hypotheses = mapped(starts, [&](const Genome& genome) {
-    const Overrides at = start_of(genome);
-    return infer::Hypothesis{"simulation", coordinates(at), {{at, {}}}, false};
-  });
-  const infer::Terms terms{infer::Effort::kLocal, {}, 0};
-  ASSIGN_OR_RETURN(auto contest, infer::compete(forward_, observed_, std::move(kinematic),
-                                                hypotheses, terms, {}));
-  Model best = std::move(contest.base);
-  double most = -INFINITY;
-  for (infer::Contender& contender : contest.contenders) {
-    ASSIGN_OR_RETURN(auto model, followed(std::move(contender.model)));
-    const double nats = hold_best(&model);
-    if (!(nats > most)) continue;
-    most = nats;
-    best = std::move(model);
+// Against the kinematics, whose values in the simulation are `start` or, without slip, `firm`.
+Status SimulationFit::judge(const Climb& best, const Genome& start, const Genome& firm,
+                            SimulatedStart* found) {
+  // Of one stretch nothing can be held out, and no fit to it shows what it predicts.
+  const auto& folds = observed_.fold;
+  found->kinematic = std::ranges::count(folds, folds.front()) == std::ssize(folds);
+  if (found->kinematic) return {};
+  ASSIGN_OR_RETURN(const auto own, held_out(best));
+  const Fitter fits = fitter(best.space);
+  const auto theirs = by_parts(fits.scores(whitened(baseline_)));
+  const infer::PairedGain gain = infer::paired_gain(own, theirs);
+  found->held_out_gain = gain.sum;
+  found->genome = genome_at(best);
+  double most = gain.sum - gain.se;
+  const std::array<const Genome*, 2> kinematic = {&start, &firm};
+  for (const Genome* genome : kinematic) {
+    const Space at = space({}, start_of(*genome));
+    ASSIGN_OR_RETURN(const Fit there, fitter(at).start(Eigen::VectorXd(0)));
+    if (!std::isfinite(there.score)) continue;
+    if (genome == &start) {
+      found->gain = (fits.known(best.fit.u, best.fit.z).score - there.score) /
+                    static_cast<double>(observed_.size());
+    }
+    // What the simulation makes of the kinematics' values is nearly what they make of them.
+    const Eigen::VectorXd z = whitened(baseline_) + there.z - whitened(kinematic_ends_);
+    const infer::PairedGain kept = infer::paired_gain(by_parts(fits.scores(z)), theirs);
+    if (kept.sum - kept.se <= most) continue;
+    most = kept.sum - kept.se;
+    found->kinematic = true;
+    found->genome = *genome;
   }
-  return followed(std::move(best));
+  if (found->kinematic) found->gain = 0;
+  return {};
 }
 
-void SimulationFit::take_spread(const Model& model, double widest, SimulatedStart* found) const {
+void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStart* found) const {
   const auto n = static_cast<Eigen::Index>(problem_.genes.size());
   Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(n, n) / (widest * widest);
+  const Eigen::MatrixXd known = fitter(climb.space).normal(climb.fit).matrix;
+  const std::vector<std::size_t>& genes =
+      climb.space.coordinates() == fitted_.size() ? fitted_ : kinematic_;
   const double unit = kUnit * kFoundSpread;
-  const Eigen::MatrixXd known = fitter(model.space).normal(model.fit).matrix / (unit * unit);
-  for (Eigen::Index j = 0; j < known.rows(); ++j) {
-    for (Eigen::Index k = 0; k < known.rows(); ++k) {
-      precision(fitted_[j], fitted_[k]) += known(j, k);
+  for (std::size_t j = 0; j < genes.size(); ++j) {
+    for (std::size_t k = 0; k < genes.size(); ++k) {
+      precision(genes[j], genes[k]) += known(j, k) / (unit * unit);
     }
   }
   for (const std::size_t g : fitted_) {
-    if (found->kinematic) precision(g, g) += 1 / (kHeldSpread * kHeldSpread);
+    const bool held = found->kinematic || !contains(genes, g);
+    if (held) precision(g, g) += 1 / (kHeldSpread * kHeldSpread);
   }
   const Eigen::MatrixXd spread = inverse_of_symmetric(precision);
   found->spread.assign(spread.data(), spread.data() + spread.size());
@@ -267,46 +318,41 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   ASSIGN_OR_RETURN(const auto kinematics, fit_kinematics(problem_));
   observe(kinematics);
   const ParameterValues values = kinematic_start(problem_, kinematics);
+  const ParameterValues grip = without_slip(problem_, values);
   const auto genome_of = [&](const ParameterValues& of) {
     return mapped(problem_.genes, [&](const Gene& gene) {
       return encode_gene(problem_.table(), gene, of[gene.row]);
     });
   };
+  const Genome start = genome_of(values), firm = genome_of(grip);
   SimulatedStart found;
-  found.genome = genome_of(values);
+  found.genome = start;
   if (fitted_.empty()) return found;
-  ASSIGN_OR_RETURN(const auto from,
-                   starts(found.genome, genome_of(without_slip(problem_, values))));
+  ASSIGN_OR_RETURN(auto all, climbs(start, firm));
   found.simulations = simulations_;
-  if (from.empty()) return found;
-  found.genome = from.front();
-  found.starts = from.size();
-  const Space held(problem_.table(), {}, start_of(from.front()));
-  ASSIGN_OR_RETURN(auto there, fitter(held).start(Eigen::VectorXd(0)));
-  ASSIGN_OR_RETURN(const auto kinematic,
-                   infer::model_of(forward_, observed_, held, std::move(there)));
-  ASSIGN_OR_RETURN(const auto best, contest(kinematic, from));
-  ASSIGN_OR_RETURN(const auto own, held_out(best));
-  // What the simulation makes of the kinematics' values is nearly what they make of them, of
-  // stretches that they were not fitted to, too.
-  const Eigen::VectorXd theirs = unseen_ + kinematic.fit.z - kinematic_;
-  const infer::PairedGain gain =
-      infer::paired_gain(own, by_parts(fitter(best.space).scores(theirs)));
-  // Of one stretch nothing can be held out, and no fit to it shows what it predicts.
-  const auto& folds = observed_.fold;
-  const bool one = std::ranges::count(folds, folds.front()) == std::ssize(folds);
-  found.held_out_gain = one ? 0 : gain.sum;
-  found.kinematic = one || gain.sum <= gain.se;
-  if (!found.kinematic) {
-    found.gain =
-        (best.fit.score - kinematic.fit.score) / static_cast<double>(problem_.log.trials.size());
-    const Overrides at = best.space.values(best.fit.u);
-    found.genome = mapped(problem_.genes, [&](const Gene& gene) {
-      return encode_gene(problem_.table(), gene, value_at(problem_, at, gene.row));
-    });
+  if (all.empty()) return found;
+  found.starts = all.size();
+  Climb grips = std::move(all.back());
+  all.pop_back();
+  keep_best(1 + std::max<std::size_t>(dynamic_.size() / 2, 1), 1, &all);
+  for (Climb& climb : all) RETURN_IF_ERROR(follow(&climb, kRaceSteps));
+  keep_best(kBestClimbs, 0, &all);
+  all.push_back(std::move(grips));
+  std::optional<Climb> best;
+  double most = -INFINITY;
+  for (Climb& climb : all) {
+    RETURN_IF_ERROR(follow(&climb, kClimbSteps));
+    if (climb.fit.slopes.size() == 0) continue;
+    const double nats = hold_best(&climb);
+    if (!(nats > most)) continue;
+    most = nats;
+    best = climb;
   }
+  if (!best) return found;
+  RETURN_IF_ERROR(follow(&*best, kClimbSteps));
+  RETURN_IF_ERROR(judge(*best, start, firm, &found));
   found.simulations = simulations_;
-  take_spread(best, widest, &found);
+  take_spread(*best, widest, &found);
   return found;
 }
 
