@@ -314,8 +314,14 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   if (const GroundHypothesis* h = fault_of(robot, reference, settings, question, fitter, fit)) {
     return Error{"the log that values are fitted to is wrong in " + h->thing + ". " + h->remedy};
   }
-  fit =
-      with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), seed, std::move(fit));
+  std::vector<GroundHypothesis> traits = that_can_show(reference, ground_hypotheses(robot));
+  if (alone) {
+    std::erase_if(traits, [](const GroundHypothesis& h) {
+      return std::ranges::any_of(h.freed,
+                                 [](const KinematicRow& row) { return FloorParts::has(row.name); });
+    });
+  }
+  fit = with_traits(fitter, traits, seed, std::move(fit));
   question.reference = reference_of(fitter, fit, seed, alone);
   for (std::size_t k = 0; k < question.rows.size(); ++k) {
     question.rows[k].nominal = fit.values[k];

@@ -12,8 +12,9 @@ namespace gapfarm {
 
 // Fits the robot to the log, from its file's values however far they are off, and says how sure
 // each value is.  `alone`: of values that the log does not show, too, as when they are what is
-// asked for; what another log is held against stays where the file has it.  Errors: no window fits;
-// a log that is the wrong way round, with the remedy.
+// asked for; what another log is held against stays where the file has it.  They are then of the
+// whole floor that was driven, not of one side of an edge on it.  Errors: no window fits; a log
+// that is the wrong way round, with the remedy.
 Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& reference,
                                         const WindowSettings& settings, std::uint64_t seed,
                                         FitMemo* memo, bool alone = false);

@@ -13,6 +13,7 @@
 #include "common/trials/files.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/wheel_loop.h"
+#include "master/ground/reference.h"
 #include "master/io/logs/bags.h"
 #include "master/io/logs/column_map.h"
 #include "tests/unit/trials/shared_data.h"
@@ -179,6 +180,17 @@ TEST(Floors, AnEdgeIsFoundWhereItIs) {
     if (reference == nullptr) continue;
     EXPECT_EQ(found.effects.size(), 1u) << found.headline;
   }
+}
+
+// Which side of an edge is the robot's own floor no log says: values that go out to other tools are
+// of all that was driven.
+TEST(Floors, ValuesOfARobotAreOfBothSidesOfAnEdge) {
+  const Floor floor{0.9, {0, 0}, 0.95, 0.05, 0.6, 0, 0.6};
+  const auto asked = ask_what_changed(robotino(), driven_on(floor, 15, 2), {}, 1, nullptr, true);
+  ASSERT_TRUE(asked.ok()) << asked.error().message;
+  const double traction = asked->reference->value_or("traction", 0);
+  EXPECT_NEAR(traction, (0.9 + 0.6 * 0.9) / 2, 0.05);
+  EXPECT_EQ(asked->reference->value_or("known_edge_ratio", 1), 1);
 }
 
 // Edges anywhere, kilometres from the tracker's origin too, under a camera whose errors last: the
