@@ -83,6 +83,12 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
     add_alias(search_.catalogue[other].name, &effect);
   }
   for (const std::string& alias : h.aliases) add_alias(alias, &effect);
+  // What is named beside it is no alternative to it.
+  std::erase_if(effect.aliases, [&](const std::string& alias) {
+    return std::ranges::any_of(search_.steps, [&](const GroundStep& named) {
+      return search_.catalogue[named.chosen].name == alias;
+    });
+  });
   if (!effect.aliases.empty()) {
     effect.alias_reason = "They move this robot alike on these runs.";
   }

@@ -189,6 +189,9 @@ TEST(WrongFile, AllOfFourWrongValuesAreNamed) {
   for (const char* name : {"wheel_separation", "motor_lag", "command_delay", "marker_offset"}) {
     EXPECT_TRUE(names(found, name)) << name << ": " << found.diagnosis.headline;
   }
+  for (const NamedEffect& e : found.diagnosis.effects) {
+    for (const std::string& alias : e.aliases) EXPECT_FALSE(names(found, alias)) << e.name;
+  }
 }
 
 }  // namespace
