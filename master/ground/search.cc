@@ -208,8 +208,10 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   for (auto& [offer, fit] : tried) {
     Candidate& c =
         candidates.emplace_back(predict_held_out(fitter, work, *search, offer, std::move(fit)));
-    // What a log is sure enough of to close more than is tolerated needs no more.
-    const bool enough = c.offer.gain >= least || c.held_out_gain.lo > kToleratedGap;
+    // What a log is sure enough of to close more than is tolerated needs no more, but beside a
+    // name: of that others have what its form leaves.
+    const bool enough =
+        c.offer.gain >= least || (search->steps.empty() && c.held_out_gain.lo > kToleratedGap);
     c.may_be_named = enough && may_be_named(c.held_out_gain) && shown(c);
   }
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
