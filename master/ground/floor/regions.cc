@@ -102,15 +102,20 @@ struct Circle {
   bool has(const Vector2d& place) const { return (place - middle).norm() < radius; }
 };
 
+// How many of the wheels' places lie on the region's floor.
+template <typename Region>
+double places_there(const std::vector<Vector2d>& places, const Region& region) {
+  return static_cast<double>(
+      std::ranges::count_if(places, [&](const Vector2d& place) { return region.has(place); }));
+}
+
 // Whether enough of the wheels' places lie on either floor.
 template <typename Region>
 bool parts(const std::vector<Vector2d>& places, const std::vector<FitRow>& rows,
            const VectorXd& values) {
   const Region region(rows, values);
-  const auto there =
-      std::ranges::count_if(places, [&](const Vector2d& place) { return region.has(place); });
-  const auto all = static_cast<double>(places.size());
-  const double fewer = std::min(static_cast<double>(there), all - static_cast<double>(there));
+  const double there = places_there(places, region), all = static_cast<double>(places.size());
+  const double fewer = std::min(there, all - there);
   return region.may_be(places) && fewer > std::max(kLeastInside * all, kLeastPlaces);
 }
 
@@ -160,8 +165,14 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
       from_there[static_cast<std::size_t>(r)].row.nominal = start[r];
     }
     const WindowFit climbed = fitter.fit(from_there, {}, start, kClimbingRounds);
-    if (climbed.objective <= most || !parts<Region>(places, rows, climbed.values)) continue;
-    most = climbed.objective;
+    if (!parts<Region>(places, rows, climbed.values)) continue;
+    // The robot's own values are those of the floor that most of the log was driven on, unless the
+    // log tells otherwise.
+    const double there = places_there(places, Region(rows, climbed.values));
+    const bool own = 2 * there < static_cast<double>(places.size());
+    const double likely = climbed.objective + (own ? kNotDistinguished : 0);
+    if (likely <= most) continue;
+    most = likely;
     best = climbed.values;
   }
   return best;
