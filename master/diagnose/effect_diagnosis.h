@@ -98,9 +98,6 @@ struct EffectDiagnosis {
   std::vector<Signature> (*marks)(const Study& study) = nullptr;
   // One level and one duration show nothing of it that another full speed would not do.
   bool changes_reach = false;
-  // A force, whose share in straight, turning and wide drives another contact model would make
-  // another one.
-  bool by_contact = false;
 
   // A camera that sees one place otherwise than another: not offered where one linear map of all
   // positions explains as much.

@@ -101,20 +101,6 @@ std::vector<Signature> in_directions(const EffectDiagnosis& row, const Signature
 
 }  // namespace
 
-Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns) {
-  std::vector<Eigen::VectorXd> parts;
-  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-    for (MotionKind kind : {MotionKind::kStraight, MotionKind::kTurn, MotionKind::kWide}) {
-      Eigen::VectorXd part = columns.col(k);
-      for (std::size_t i = 0; i < study.size(); ++i) {
-        if (study.cells[study.trials[i].cell].kind != kind) part.segment<3>(3 * i).setZero();
-      }
-      if (part.squaredNorm() > 0) parts.push_back(std::move(part));
-    }
-  }
-  return stack(parts);
-}
-
 Eigen::Vector2d middle_of(const Study& study) {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const ResidualTrial& t : study.trials) {

@@ -30,9 +30,6 @@ struct Signature {
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
                                           const std::vector<std::string>& excluded);
 
-// Each column in three, one a kind of drive; those of nothing but zeros omitted.
-Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
-
 // Discs of floor, simulated trial by trial.  One that cannot be simulated explains nothing.
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
                                                 const std::vector<Patch>& places);

@@ -201,9 +201,6 @@ class Selection {
           competition_.base().only(competition_.coordinates_of(mark.effect)).dimensions();
       mark.columns = found_->model.fit.slopes.middleCols(at, own);
       study_.drop_ignored(mark.columns);
-      if (of_.subject.effects->row(mark.effect).by_contact) {
-        mark.columns = split_by_kind(study_, mark.columns);
-      }
       mark.fixed = competition_.values_of(mark.effect, found_->model);
       mark.whole = true;
       at += own;

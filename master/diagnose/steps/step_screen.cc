@@ -173,7 +173,6 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
     columns.col(0) = study.whiten(differences(*ends[k], fit.ends));  // its contribution
     columns.rightCols(columns.cols() - 1) = fit.jacobian(Eigen::all, own);
     at_estimate.data += columns.col(0);
-    if (of.subject.effects->row(name).by_contact) columns = split_by_kind(study, columns);
     study.drop_ignored(columns);
     at_estimate.columns.push_back(std::move(columns));
   }

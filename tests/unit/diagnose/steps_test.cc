@@ -242,17 +242,6 @@ TEST(Proposals, AreTheBestOfEachEffectBestFirst) {
   EXPECT_EQ(s.best({"motor_asymmetry"}).size(), 1u);
 }
 
-TEST(Signatures, OfKindsOfDriveAddUpToTheWhole) {
-  Study study = plain_study(6);
-  study.cells.push_back({{"turn_ccw", -1, 1, 1}, MotionKind::kTurn, 1, 1, 1, 3});
-  for (std::size_t i = 3; i < 6; ++i) study.trials[i].cell = 1;
-  const Eigen::VectorXd whole = column(6, [](std::size_t i) { return double(i + 1); });
-  const Eigen::MatrixXd parts = split_by_kind(study, whole);
-  ASSERT_EQ(parts.cols(), 2);  // no wide drives
-  EXPECT_LT((parts.rowwise().sum() - whole).norm(), 1e-12);
-  EXPECT_EQ(parts.col(0).dot(parts.col(1)), 0);
-}
-
 TEST(Nuisances, HoldTheGaugesSlope) {
   Driven d(1);
   const auto columns = nuisance_columns(d.predictor, d.study);
