@@ -36,6 +36,9 @@ bool is_still(const btTransform& before, const btTransform& now, double dt_s) {
 
 double clamped_asin(double sine) { return std::asin(std::clamp(sine, -1.0, 1.0)); }
 
+namespace {
+
+// The sample between two others at `t_s`.
 MotionSample blend(const MotionSample& a, const MotionSample& b, double t_s) {
   const double f = b.t_s > a.t_s ? (t_s - a.t_s) / (b.t_s - a.t_s) : 1;
   const auto mix = [f](double from, double to) { return from + f * (to - from); };
@@ -49,6 +52,31 @@ MotionSample blend(const MotionSample& a, const MotionSample& b, double t_s) {
   sample.pitch_rad = mix(a.pitch_rad, b.pitch_rad);
   sample.kinetic_energy_j = mix(a.kinetic_energy_j, b.kinetic_energy_j);
   return sample;
+}
+
+}  // namespace
+
+PathRecorder::PathRecorder(std::vector<MotionSample>* path, double interval_s)
+    : path_(path), interval_s_(interval_s) {
+  if (path_ != nullptr) path_->clear();
+}
+
+void PathRecorder::add(const MotionSample& sample) {
+  if (path_ == nullptr) return;
+  if (path_->empty()) {
+    path_->push_back(sample);
+    next_s_ = sample.t_s + interval_s_;
+  }
+  const double begin_s = path_->front().t_s;
+  while (interval_s_ > 0 && next_s_ <= sample.t_s) {
+    path_->push_back(blend(last_, sample, next_s_));
+    next_s_ = begin_s + static_cast<double>(path_->size()) * interval_s_;
+  }
+  last_ = sample;
+}
+
+void PathRecorder::finish() {
+  if (path_ != nullptr && !path_->empty() && path_->back().t_s < last_.t_s) path_->push_back(last_);
 }
 
 }  // namespace gapfarm

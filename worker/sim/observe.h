@@ -1,6 +1,8 @@
 // What is read off a body between two steps: whether it is sound, stands, rests, and where it is.
 #pragma once
 
+#include <vector>
+
 #include "worker/sim/bullet.h"
 #include "worker/sim/robot/motion.h"
 
@@ -25,7 +27,19 @@ bool is_still(const btTransform& before, const btTransform& now, double dt_s);
 
 double clamped_asin(double sine);
 
-// The sample between two others at `t_s`.
-MotionSample blend(const MotionSample& a, const MotionSample& b, double t_s);
+// Samples at every `interval_s`, between the states that a model passes through.
+class PathRecorder {
+ public:
+  PathRecorder(std::vector<MotionSample>* path, double interval_s);
+  bool wanted() const { return path_ != nullptr; }
+  void add(const MotionSample& sample);  // times must not decrease
+  void finish();                         // the last state is always kept
+
+ private:
+  std::vector<MotionSample>* path_;
+  double interval_s_;
+  double next_s_ = 0;
+  MotionSample last_;
+};
 
 }  // namespace gapfarm

@@ -9,48 +9,30 @@
 #include "worker/sim/observe.h"
 #include "worker/sim/patches.h"
 #include "worker/sim/push/face_step.h"
-#include "worker/sim/push/push_engine.h"
+#include "worker/sim/push/stepped_push.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kNear_m = 2e-3;        // the finger is looked at from so near
 constexpr double kLeastGain = 0.05;     // share that a falling friction keeps
 constexpr double kRepairedDepth = 0.2;  // of a depth, a step
-const Eigen::Vector2d kNowhere(1e3, 1e3);
 
 Eigen::Vector2d turned(double angle, const Eigen::Vector2d& d) {
   const double c = std::cos(angle), s = std::sin(angle);
   return {c * d[0] - s * d[1], s * d[0] + c * d[1]};
 }
 
-class DistributedPush final : public PushSimulator {
+class DistributedPush final : public SteppedPush {
  public:
   explicit DistributedPush(const PushSettings& settings)
-      : PushSimulator(settings),
+      : SteppedPush(settings, 0),
         face_(face_points(settings)),
         centre_(settings.com_x_m, settings.com_y_m),
-        step_(settings.mass_kg, settings.mass_kg * settings.gyration_m2) {}
-
-  Motion run(std::span<const FingerSample> finger, const Floor& table,
-             std::vector<MotionSample>* path, double interval_s) override {
-    reset(table, Eigen::Vector3d::Zero());
-    return follow(FingerPath(finger), /*at_rest=*/table.tilt_rad == 0, path, interval_s);
-  }
-
-  Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
-               std::vector<MotionSample>* path, double interval_s) override {
-    const Eigen::Vector2d at_centre = velocity + spin * Eigen::Vector2d(-centre_[1], centre_[0]);
-    reset(table, {at_centre[0], at_centre[1], spin});
-    const FingerSample nowhere[] = {{0, kNowhere}, {1e-9, kNowhere}};
-    return follow(FingerPath(nowhere), false, path, interval_s);
-  }
+        face_step_(settings.mass_kg, settings.mass_kg * settings.gyration_m2) {}
 
  private:
-  void reset(const Floor& table, const Eigen::Vector3d& velocity);
-  Motion follow(const FingerPath& finger_path, bool at_rest, std::vector<MotionSample>* path,
-                double interval_s);
-  void advance(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt);
+  void reset(const Floor& table, const Eigen::Vector2d& velocity, double spin) override;
+  void step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt) override;
   void place_points(const Pose& X_SM, double dt);
   bool place_touch(const Pose& X_SM, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                    double dt, FingerTouch& touch) const;
@@ -60,22 +42,18 @@ class DistributedPush final : public PushSimulator {
     const Eigen::Vector2d p = Eigen::Vector2d(X_SM.x, X_SM.y) - turned(X_SM.theta, centre_);
     return {p[0], p[1], X_SM.theta};
   }
-  MotionSample state(double t_s) const;
-  bool still() const {
+  MotionSample state(double t_s) const override;
+  bool sane() const override {
+    return is_sane({velocity_[0], velocity_[1], 0}, {0, 0, velocity_[2]});
+  }
+  bool still(double /*dt_s*/) const override {
     return std::hypot(velocity_[0], velocity_[1]) < kRestSpeed_m_s &&
            std::abs(velocity_[2]) < kRestTurn_rad_s;
-  }
-  // The step from which on the finger may touch a piece that rests now; none: never.
-  std::optional<long> next_touch(const FingerPath& finger_path, double t_s, double dt_s) const {
-    const double reach = settings_.finger_radius_m + settings_.contact_margin_m + kNear_m;
-    const auto when = finger_path.approach(t_s, centroid_pose(X_SM_), settings_.corners, reach);
-    if (!when) return std::nullopt;
-    return std::max(0L, static_cast<long>((*when - finger_path.begin_s()) / dt_s));
   }
 
   std::vector<FacePoint> face_;
   Eigen::Vector2d centre_;  // of mass, from the centroid
-  FaceStep step_;
+  FaceStep face_step_;
   FaceStep::Points points_;  // in the grain's axes
   Floor table_;
   double load_n_ = 0;                               // on the whole face
@@ -84,14 +62,15 @@ class DistributedPush final : public PushSimulator {
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
 };
 
-void DistributedPush::reset(const Floor& table, const Eigen::Vector3d& velocity) {
+void DistributedPush::reset(const Floor& table, const Eigen::Vector2d& velocity, double spin) {
   table_ = table;
   const Eigen::Vector3d gravity = gravity_in_start_frame(table, settings_.gravity_m_s2);
   load_n_ = -gravity[2] * settings_.mass_kg;
   pull_ = gravity.head<2>();
   X_SM_ = {centre_[0], centre_[1], 0};
-  velocity_ = velocity;
-  step_.reset();
+  const Eigen::Vector2d at_centre = velocity + spin * Eigen::Vector2d(-centre_[1], centre_[0]);
+  velocity_ = {at_centre[0], at_centre[1], spin};
+  face_step_.reset();
   for (auto* of_points : {&points_.x, &points_.y, &points_.extent, &points_.impulse}) {
     of_points->assign((face_.size() + FaceStep::kBlock - 1) / FaceStep::kBlock * FaceStep::kBlock,
                       0);
@@ -159,7 +138,7 @@ bool DistributedPush::place_touch(const Pose& X_SM, const Eigen::Vector2d& from,
   return true;
 }
 
-void DistributedPush::advance(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt) {
+void DistributedPush::step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt) {
   const Pose middle{X_SM_.x + dt / 2 * velocity_[0], X_SM_.y + dt / 2 * velocity_[1],
                     X_SM_.theta + dt / 2 * velocity_[2]};
   place_points(middle, dt);
@@ -169,8 +148,8 @@ void DistributedPush::advance(const Eigen::Vector2d& from, const Eigen::Vector2d
   const Eigen::Vector2d now = turned(-grain, velocity_.head<2>());
   const Eigen::Vector2d free = now + dt * turned(-grain, pull_);
   const Eigen::Vector3d after =
-      step_.solve(points_, {free[0], free[1], velocity_[2]}, {now[0], now[1], velocity_[2]},
-                  near ? &touch : nullptr, dt);
+      face_step_.solve(points_, {free[0], free[1], velocity_[2]}, {now[0], now[1], velocity_[2]},
+                       near ? &touch : nullptr, dt);
   velocity_ << turned(grain, after.head<2>()), after[2];
   X_SM_.x += dt * velocity_[0];
   X_SM_.y += dt * velocity_[1];
@@ -186,48 +165,6 @@ MotionSample DistributedPush::state(double t_s) const {
       settings_.mass_kg / 2 *
       (velocity_.head<2>().squaredNorm() + settings_.gyration_m2 * velocity_[2] * velocity_[2]);
   return sample;
-}
-
-Motion DistributedPush::follow(const FingerPath& finger_path, bool at_rest,
-                               std::vector<MotionSample>* path, double interval_s) {
-  const double dt = 1 / (settings_.step_rate_hz * settings_.sub_steps);
-  const double begin = finger_path.begin_s();
-  PathRecorder recorder(path, interval_s);
-  recorder.add(state(begin));
-  Motion motion;
-  motion.outcome = MotionOutcome::kNeverRested;
-  double rest_s = at_rest ? kRestTime_s : 0;
-  double t = begin, moved_until = begin;
-  long steps = 0;
-  for (long k = 0; t < finger_path.end_s() + kSettleLimit_s; ++k) {
-    if (rest_s >= kRestTime_s) {
-      const auto touched = t < finger_path.end_s() ? next_touch(finger_path, t, dt) : std::nullopt;
-      if (!touched) {
-        motion.outcome = MotionOutcome::kOk;
-        break;
-      }
-      k = std::max(k, *touched);  // nothing happens until then
-      rest_s = 0;
-    }
-    t = begin + static_cast<double>(k) * dt;
-    const double next = begin + static_cast<double>(k + 1) * dt;
-    advance(finger_path.at(t), finger_path.at(next), dt);
-    t = next;
-    ++steps;
-    if (!is_sane({velocity_[0], velocity_[1], 0}, {0, 0, velocity_[2]})) {
-      motion.outcome = MotionOutcome::kDiverged;
-      motion.duration_s = static_cast<double>(steps) * dt;
-      return motion;
-    }
-    if (recorder.wanted()) recorder.add(state(t));
-    rest_s = still() ? rest_s + dt : 0;
-    if (!still()) moved_until = t;
-  }
-  motion.duration_s = static_cast<double>(steps) * dt;
-  motion.X_SE = state(t).X_SB;
-  motion.rest_time_s = std::max(0.0, moved_until - finger_path.end_s());
-  recorder.finish();
-  return motion;
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worker/sim/observe.h"
 #include "worker/sim/push/push_engine.h"
 
 namespace gapfarm {

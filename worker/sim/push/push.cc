@@ -6,107 +6,46 @@
 #include "worker/sim/observe.h"
 #include "worker/sim/push/push_engine.h"
 #include "worker/sim/push/push_world.h"
+#include "worker/sim/push/stepped_push.h"
 
 namespace gapfarm {
 namespace {
 
-// The finger's touch is simulated from this far away, and from so many steps before, in which the
-// supports take up the load.
-constexpr double kApproach_m = 2e-3;
-constexpr int kSettleSteps = 8;
+// In which the supports take up the load before the finger comes.
+constexpr long kSettleSteps = 8;
 
-class BulletPush final : public PushSimulator {
+class BulletPush final : public SteppedPush {
  public:
-  explicit BulletPush(const PushSettings& settings) : PushSimulator(settings), world_(settings) {}
-
-  Motion run(std::span<const FingerSample> finger, const Floor& table,
-             std::vector<MotionSample>* path, double interval_s) override {
-    world_.reset(table, Eigen::Vector2d::Zero(), 0);
-    return follow(FingerPath(finger), /*at_rest=*/table.tilt_rad == 0, path, interval_s);
-  }
-
-  Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
-               std::vector<MotionSample>* path, double interval_s) override {
-    world_.reset(table, velocity, spin);
-    const Eigen::Vector2d away(1e3, 1e3);
-    const FingerSample nowhere[] = {{0, away}, {1e-9, away}};
-    return follow(FingerPath(nowhere), false, path, interval_s);
-  }
+  explicit BulletPush(const PushSettings& settings)
+      : SteppedPush(settings, kSettleSteps), world_(settings) {}
 
  private:
-  Motion follow(const FingerPath& finger_path, bool at_rest, std::vector<MotionSample>* path,
-                double interval_s);
-
-  // The step at which a piece that rests now is next touched, less the settling; none: never.
-  std::optional<long> next_touch(const FingerPath& finger_path, double t_s, double dt_s) const {
-    const double reach = settings_.finger_radius_m + settings_.contact_margin_m + kApproach_m;
-    const auto when = finger_path.approach(t_s, world_.state(t_s).X_SB, settings_.corners, reach);
-    if (!when) return std::nullopt;
-    return std::max(0L, static_cast<long>((*when - finger_path.begin_s()) / dt_s) - kSettleSteps);
+  void reset(const Floor& table, const Eigen::Vector2d& velocity, double spin) override {
+    world_.reset(table, velocity, spin);
+  }
+  void step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt_s) override {
+    before_ = world_.metric_transform();
+    world_.step(from, to, dt_s);
+  }
+  void skip() override { world_.forget_touch(); }
+  MotionSample state(double t_s) const override { return world_.state(t_s); }
+  bool sane() const override {
+    return is_sane(world_.metric_velocity(), world_.body().getAngularVelocity());
+  }
+  bool still(double dt_s) const override {
+    return is_still(before_, world_.metric_transform(), dt_s);
+  }
+  bool stands(Motion& motion) const override {
+    const btMatrix3x3& basis = world_.body().getWorldTransform().getBasis();
+    motion.max_roll_rad = std::max(motion.max_roll_rad, std::abs(basis[2].y()));
+    motion.max_pitch_rad = std::max(motion.max_pitch_rad, std::abs(basis[2].x()));
+    motion.max_heave_m = std::max(motion.max_heave_m, std::abs(world_.state(0).height_m));
+    return !has_fallen(basis);
   }
 
   PushWorld world_;
+  btTransform before_;
 };
-
-Motion BulletPush::follow(const FingerPath& finger_path, bool at_rest,
-                          std::vector<MotionSample>* path, double interval_s) {
-  const double dt = 1 / (settings_.step_rate_hz * settings_.sub_steps);
-  const double begin = finger_path.begin_s();
-  PathRecorder recorder(path, interval_s);
-  Motion motion;
-  motion.outcome = MotionOutcome::kNeverRested;
-  recorder.add(world_.state(begin));
-  double max_roll_sine = 0, max_pitch_sine = 0;
-  double rest_s = at_rest ? kRestTime_s : 0;
-  double t = begin;
-  double moved_until = begin;
-  long steps = 0;
-  for (long k = 0; t < finger_path.end_s() + kSettleLimit_s; ++k) {
-    if (rest_s >= kRestTime_s) {
-      const auto touch = t < finger_path.end_s() ? next_touch(finger_path, t, dt) : std::nullopt;
-      if (!touch) {
-        motion.outcome = MotionOutcome::kOk;
-        break;
-      }
-      if (*touch > k) {  // nothing happens until then
-        k = *touch;
-        world_.forget_touch();
-      }
-      rest_s = 0;
-    }
-    t = begin + static_cast<double>(k) * dt;
-    const double next = begin + static_cast<double>(k + 1) * dt;
-    const btTransform before = world_.metric_transform();
-    world_.step(finger_path.at(t), finger_path.at(next), dt);
-    ++steps;
-    t = next;
-    if (!is_sane(world_.metric_velocity(), world_.body().getAngularVelocity())) {
-      motion.outcome = MotionOutcome::kDiverged;
-      break;
-    }
-    const btTransform now = world_.metric_transform();
-    const btVector3& up = now.getBasis()[2];
-    max_roll_sine = std::max(max_roll_sine, std::abs(up.y()));
-    max_pitch_sine = std::max(max_pitch_sine, std::abs(up.x()));
-    motion.max_heave_m = std::max(motion.max_heave_m, std::abs(world_.state(t).height_m));
-    if (recorder.wanted()) recorder.add(world_.state(t));
-    if (has_fallen(now.getBasis())) {
-      motion.outcome = MotionOutcome::kFellOver;
-      break;
-    }
-    const bool still = is_still(before, now, dt);
-    rest_s = still ? rest_s + dt : 0;
-    if (!still) moved_until = t;
-  }
-  motion.duration_s = static_cast<double>(steps) * dt;
-  motion.max_roll_rad = clamped_asin(max_roll_sine);
-  motion.max_pitch_rad = clamped_asin(max_pitch_sine);
-  if (motion.outcome == MotionOutcome::kDiverged) return motion;
-  motion.X_SE = world_.state(t).X_SB;
-  motion.rest_time_s = std::max(0.0, moved_until - finger_path.end_s());
-  recorder.finish();
-  return motion;
-}
 
 }  // namespace
 
@@ -156,29 +95,6 @@ std::optional<double> FingerPath::approach(double t_s, const Pose& X_SC,
     from_s = sample.t_s;
   }
   return std::nullopt;
-}
-
-PathRecorder::PathRecorder(std::vector<MotionSample>* path, double interval_s)
-    : path_(path), interval_s_(interval_s) {
-  if (path_ != nullptr) path_->clear();
-}
-
-void PathRecorder::add(const MotionSample& sample) {
-  if (path_ == nullptr) return;
-  if (path_->empty()) {
-    path_->push_back(sample);
-    next_s_ = sample.t_s + interval_s_;
-  }
-  const double begin_s = path_->front().t_s;
-  while (interval_s_ > 0 && next_s_ <= sample.t_s) {
-    path_->push_back(blend(last_, sample, next_s_));
-    next_s_ = begin_s + static_cast<double>(path_->size()) * interval_s_;
-  }
-  last_ = sample;
-}
-
-void PathRecorder::finish() {
-  if (path_ != nullptr && !path_->empty() && path_->back().t_s < last_.t_s) path_->push_back(last_);
 }
 
 std::unique_ptr<PushSimulator> make_push_simulator(const PushSettings& settings) {

@@ -31,21 +31,6 @@ class FingerPath {
   std::span<const FingerSample> samples_;
 };
 
-// Samples at every `interval_s`, between the states that a model passes through.
-class PathRecorder {
- public:
-  PathRecorder(std::vector<MotionSample>* path, double interval_s);
-  bool wanted() const { return path_ != nullptr; }
-  void add(const MotionSample& sample);  // times must not decrease
-  void finish();                         // the last state is always kept
-
- private:
-  std::vector<MotionSample>* path_;
-  double interval_s_;
-  double next_s_ = 0;
-  MotionSample last_;
-};
-
 // A convex outline and a point beside it.
 
 // Where a point is nearest to an outline.

@@ -111,13 +111,8 @@ Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<M
 
   Motion motion;
   motion.outcome = MotionOutcome::kNeverRested;
-  MotionSample last;
-  double next_sample_s = interval_s;
-  if (path != nullptr) {
-    path->clear();
-    last = sample(0);
-    path->push_back(last);
-  }
+  PathRecorder recorder(path, interval_s);
+  if (recorder.wanted()) recorder.add(sample(0));
   double max_roll_sine = 0;
   double max_pitch_sine = 0;
   double rest_s = 0;
@@ -142,14 +137,7 @@ Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<M
     max_pitch_sine = std::max(max_pitch_sine, std::abs(up.x()));
     const double height = now.getOrigin().z() + up.dot(centre);
     motion.max_heave_m = std::max(motion.max_heave_m, std::abs(height));
-    if (path != nullptr) {
-      const MotionSample current = sample(t);
-      for (; interval_s > 0 && next_sample_s <= t;
-           next_sample_s = static_cast<double>(path->size()) * interval_s) {
-        path->push_back(blend(last, current, next_sample_s));
-      }
-      last = current;
-    }
+    if (recorder.wanted()) recorder.add(sample(t));
     if (has_fallen(now.getBasis())) {
       motion.outcome = MotionOutcome::kFellOver;
       break;
@@ -166,7 +154,7 @@ Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<M
   if (motion.outcome == MotionOutcome::kDiverged) return motion;
   motion.X_SE = pose();
   motion.rest_time_s = std::max(0.0, t - rest_s - drive.duration_s);
-  if (path != nullptr && path->back().t_s < t) path->push_back(last);
+  recorder.finish();
   return motion;
 }
 
