@@ -49,11 +49,10 @@ class PatchRobot::Impl final : public LeanWorld {
   void step(std::span<const PatchMotion> motions, double dt_s);
   const btRigidBody& body() const { return *body_; }
   btVector3 origin() const { return {-settings_.com_x_m, -settings_.com_y_m, -settings_.com_z_m}; }
-  std::vector<double> loads() const;
+  std::vector<double> loads();
 
  private:
-  void solveConstraints(btContactSolverInfo& info) override;
-  void prepare_contacts();
+  void prepare_contacts() override;
   void clear();
   // Child of the body's shape that a contact belongs to.
   int patch_of(const btManifoldPoint& point, bool floor_is_second) const {
@@ -68,7 +67,6 @@ class PatchRobot::Impl final : public LeanWorld {
   std::vector<ContactGrip> grips_;
   std::vector<PatchMotion> motions_;
   std::optional<btRigidBody> floor_, body_;
-  double last_step_s_ = 0;
   StepCounter* steps_;
 };
 
@@ -82,9 +80,7 @@ void PatchRobot::Impl::clear() {
 
 void PatchRobot::Impl::reset(const BodyTwist& twist) {
   clear();
-  broadphase.resetPool(&dispatcher);
-  solver.reset();
-  last_step_s_ = 0;
+  start_anew();
   floor_.emplace(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
   addRigidBody(&*floor_, kFloorGroup, kContactGroup);
   // A flat body has half its yaw inertia about each of the other axes.
@@ -105,12 +101,7 @@ void PatchRobot::Impl::reset(const BodyTwist& twist) {
 
 void PatchRobot::Impl::step(std::span<const PatchMotion> motions, double dt_s) {
   std::copy(motions.begin(), motions.end(), motions_.begin());
-  getSolverInfo().m_warmstartingFactor = last_step_s_ > 0 ? dt_s / last_step_s_ : 1;
-  last_step_s_ = dt_s;
-  const double erp = kRepairedShare * dt_s * settings_.step_rate_hz;
-  getSolverInfo().m_erp = erp;
-  getSolverInfo().m_erp2 = erp;
-  stepSimulation(dt_s, 0);
+  LeanWorld::step(dt_s, kRepairedShare * dt_s * settings_.step_rate_hz);
   count_step(steps_);
 }
 
@@ -120,53 +111,36 @@ void PatchRobot::Impl::prepare_contacts() {
   ahead = ahead.length2() > 1e-12 ? ahead.normalized() : btVector3(1, 0, 0);
   const btVector3 left(-ahead.y(), ahead.x(), 0);
   const double softness = kSoftness / settings_.mass_kg;
-  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
-    btPersistentManifold* manifold = dispatcher.getInternalManifoldPointer()[m];
-    const bool floor_is_second = manifold->getBody1() == &*floor_;
-    for (int i = 0; i < manifold->getNumContacts(); ++i) {
-      btManifoldPoint& point = manifold->getContactPoint(i);
-      const auto index = static_cast<std::size_t>(patch_of(point, floor_is_second));
-      const PatchMotion& motion = motions_[index];
-      const double c = std::cos(motion.e1_rad);
-      const double s = std::sin(motion.e1_rad);
-      point.m_lateralFrictionDir1 = c * ahead + s * left;
-      point.m_lateralFrictionDir2 = c * left - s * ahead;
-      point.m_contactMotion1 = floor_is_second ? motion.speed_m_s : -motion.speed_m_s;
-      point.m_contactMotion2 = 0;
-      if (motion.across_m_s != 0) {
-        point.m_contactMotion2 = floor_is_second ? motion.across_m_s : -motion.across_m_s;
-      }
-      point.m_contactCFM = softness;
-      point.m_contactERP = getSolverInfo().m_erp2;
-      point.m_contactPointFlags |=
-          BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
-      point.m_combinedFriction = settings_.patches[index].friction;
-      point.m_frictionCFM = settings_.creep * (std::abs(motion.speed_m_s) + kCreepAtRest_m_s) +
-                            settings_.creep_speed_m_s;
-      point.m_userPersistentData = &grips_[index];
+  each_contact(&*floor_, [&](btManifoldPoint& point, bool floor_is_second) {
+    const auto index = static_cast<std::size_t>(patch_of(point, floor_is_second));
+    const PatchMotion& motion = motions_[index];
+    const double c = std::cos(motion.e1_rad);
+    const double s = std::sin(motion.e1_rad);
+    point.m_lateralFrictionDir1 = c * ahead + s * left;
+    point.m_lateralFrictionDir2 = c * left - s * ahead;
+    point.m_contactMotion1 = floor_is_second ? motion.speed_m_s : -motion.speed_m_s;
+    point.m_contactMotion2 = 0;
+    if (motion.across_m_s != 0) {
+      point.m_contactMotion2 = floor_is_second ? motion.across_m_s : -motion.across_m_s;
     }
-  }
+    point.m_contactCFM = softness;
+    point.m_contactERP = getSolverInfo().m_erp2;
+    point.m_contactPointFlags |=
+        BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
+    point.m_combinedFriction = settings_.patches[index].friction;
+    point.m_frictionCFM = settings_.creep * (std::abs(motion.speed_m_s) + kCreepAtRest_m_s) +
+                          settings_.creep_speed_m_s;
+    point.m_userPersistentData = &grips_[index];
+  });
 }
 
-void PatchRobot::Impl::solveConstraints(btContactSolverInfo& info) {
-  prepare_contacts();
-  solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(),
-                    dispatcher.getInternalManifoldPointer(), dispatcher.getNumManifolds(), nullptr,
-                    0, info, nullptr, &dispatcher);
-}
-
-std::vector<double> PatchRobot::Impl::loads() const {
+std::vector<double> PatchRobot::Impl::loads() {
   std::vector<double> loads(settings_.patches.size(), 0.0);
   double sum = 0;
-  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
-    const btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
-    const bool floor_is_second = manifold->getBody1() == &*floor_;
-    for (int i = 0; i < manifold->getNumContacts(); ++i) {
-      const btManifoldPoint& point = manifold->getContactPoint(i);
-      loads[static_cast<std::size_t>(patch_of(point, floor_is_second))] += point.m_appliedImpulse;
-      sum += point.m_appliedImpulse;
-    }
-  }
+  each_contact(&*floor_, [&](btManifoldPoint& point, bool floor_is_second) {
+    loads[static_cast<std::size_t>(patch_of(point, floor_is_second))] += point.m_appliedImpulse;
+    sum += point.m_appliedImpulse;
+  });
   if (sum > 0) {
     for (double& load : loads) load /= sum;
   }

@@ -64,6 +64,28 @@ void LeanWorld::predictUnconstraintMotion(btScalar dt_s) {
   }
 }
 
+void LeanWorld::start_anew() {
+  broadphase.resetPool(&dispatcher);
+  solver.reset();
+  last_step_s_ = 0;
+}
+
+void LeanWorld::step(double dt_s, double repaired_share) {
+  btContactSolverInfo& info = getSolverInfo();
+  info.m_warmstartingFactor = last_step_s_ > 0 ? dt_s / last_step_s_ : 1;
+  last_step_s_ = dt_s;
+  info.m_erp = info.m_erp2 = repaired_share;
+  stepSimulation(dt_s, 0);
+}
+
+void LeanWorld::solveConstraints(btContactSolverInfo& info) {
+  prepare_contacts();
+  solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(),
+                    dispatcher.getInternalManifoldPointer(), dispatcher.getNumManifolds(),
+                    m_constraints.size() > 0 ? &m_constraints[0] : nullptr, m_constraints.size(),
+                    info, nullptr, &dispatcher);
+}
+
 RobotWorld::RobotWorld(const SimSettings& settings)
     : LeanWorld(settings.friction_ratio,
                 settings.linear_damping > 0 || settings.angular_damping > 0, sweeps(settings)),
@@ -83,10 +105,8 @@ void RobotWorld::clear() {
 
 void RobotWorld::reset(const Floor& floor) {
   clear();
-  broadphase.resetPool(&dispatcher);
-  solver.reset();
+  start_anew();
   floor_ = floor;
-  last_step_s_ = 0;
   const Eigen::Vector3d gravity = gravity_in_start_frame(floor, settings_.gravity_m_s2);
   setGravity(btVector3(gravity.x(), gravity.y(), gravity.z()));
 
@@ -101,12 +121,7 @@ void RobotWorld::reset(const Floor& floor) {
 void RobotWorld::step(const SideSpeeds& speeds, double dt_s) {
   robot_->drive(speeds, dt_s);
   if (floor_.nap_strength != 0 || floor_.rolling_resistance != 0) apply_drag(dt_s);
-  getSolverInfo().m_warmstartingFactor = last_step_s_ > 0 ? dt_s / last_step_s_ : 1;
-  last_step_s_ = dt_s;
-  const double erp = kRepairedShare * dt_s * settings_.step_rate_hz * settings_.sub_steps;
-  getSolverInfo().m_erp = erp;
-  getSolverInfo().m_erp2 = erp;
-  stepSimulation(dt_s, 0);
+  LeanWorld::step(dt_s, kRepairedShare * dt_s * settings_.step_rate_hz * settings_.sub_steps);
 }
 
 void RobotWorld::apply_drag(double dt_s) {
@@ -122,7 +137,6 @@ void RobotWorld::apply_drag(double dt_s) {
   body.applyImpulse(settings_.mass_kg * dt_s * btVector3(drag.x(), drag.y(), 0), floor_point);
 }
 
-// Writes friction and the surface's own speed into every contact with the floor.
 void RobotWorld::prepare_contacts() {
   const btRigidBody& body = robot_->body();
   const SideSpeeds speeds = robot_->contact_speeds();
@@ -132,35 +146,22 @@ void RobotWorld::prepare_contacts() {
   // Standing on its end the robot has fallen over and the run ends; any direction will do.
   ahead = ahead.length2() > 1e-12 ? ahead.normalized() : btVector3(1, 0, 0);
   const btVector3 left(-ahead.y(), ahead.x(), 0);
-  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
-    btPersistentManifold* manifold = dispatcher.getInternalManifoldPointer()[m];
-    const bool floor_is_second = manifold->getBody1() == floor_body_.get();
-    for (int i = 0; i < manifold->getNumContacts(); ++i) {
-      btManifoldPoint& point = manifold->getContactPoint(i);
-      const btVector3& on_robot = floor_is_second ? point.m_localPointA : point.m_localPointB;
-      const double speed = on_robot.y() > middle_y ? speeds.left : speeds.right;
-      const btVector3& on_floor = point.getPositionWorldOnB();
-      point.m_lateralFrictionDir1 = ahead;
-      point.m_lateralFrictionDir2 = left;
-      // Wanted velocity of the first body over the second where they touch.
-      point.m_contactMotion1 = floor_is_second ? speed : -speed;
-      point.m_contactCFM = settings_.size.contact_softness;
-      point.m_contactERP = getSolverInfo().m_erp2;
-      point.m_contactPointFlags |=
-          BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
-      point.m_combinedFriction =
-          settings_.friction * patch_factor(floor_, on_floor.x(), on_floor.y());
-      point.m_frictionCFM = settings_.tread_creep * (std::abs(speed) + kCreepAtRest_m_s);
-    }
-  }
-}
-
-void RobotWorld::solveConstraints(btContactSolverInfo& info) {
-  prepare_contacts();
-  solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(),
-                    dispatcher.getInternalManifoldPointer(), dispatcher.getNumManifolds(),
-                    m_constraints.size() > 0 ? &m_constraints[0] : nullptr, m_constraints.size(),
-                    info, nullptr, &dispatcher);
+  each_contact(floor_body_.get(), [&](btManifoldPoint& point, bool floor_is_second) {
+    const btVector3& on_robot = floor_is_second ? point.m_localPointA : point.m_localPointB;
+    const double speed = on_robot.y() > middle_y ? speeds.left : speeds.right;
+    const btVector3& on_floor = point.getPositionWorldOnB();
+    point.m_lateralFrictionDir1 = ahead;
+    point.m_lateralFrictionDir2 = left;
+    // Wanted velocity of the first body over the second where they touch.
+    point.m_contactMotion1 = floor_is_second ? speed : -speed;
+    point.m_contactCFM = settings_.size.contact_softness;
+    point.m_contactERP = getSolverInfo().m_erp2;
+    point.m_contactPointFlags |=
+        BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
+    point.m_combinedFriction =
+        settings_.friction * patch_factor(floor_, on_floor.x(), on_floor.y());
+    point.m_frictionCFM = settings_.tread_creep * (std::abs(speed) + kCreepAtRest_m_s);
+  });
 }
 
 }  // namespace gapfarm

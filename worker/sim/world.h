@@ -119,6 +119,25 @@ class LeanWorld : protected WorldParts, public btDiscreteDynamicsWorld {
   // `damped`: some body has linear or angular damping.
   LeanWorld(double friction_ratio, bool damped, int solver_iterations);
 
+  // To the state of a world that has made no step.
+  void start_anew();
+  // One step that repairs this share of position errors; the last one's impulses, in proportion to
+  // the lengths, start the solver.
+  void step(double dt_s, double repaired_share);
+  // Calls `use` with every contact of two bodies and whether `second` is the second of them.
+  template <class Use>
+  void each_contact(const btRigidBody* second, const Use& use) {
+    for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+      btPersistentManifold* manifold = dispatcher.getInternalManifoldPointer()[m];
+      for (int i = 0; i < manifold->getNumContacts(); ++i) {
+        use(manifold->getContactPoint(i), manifold->getBody1() == second);
+      }
+    }
+  }
+  // Writes what the solver needs to know into every contact.
+  virtual void prepare_contacts() = 0;
+  void solveConstraints(btContactSolverInfo& info) override;
+
  private:
   void predictUnconstraintMotion(btScalar dt_s) override;
   void createPredictiveContacts(btScalar /*dt_s*/) override {}
@@ -129,6 +148,7 @@ class LeanWorld : protected WorldParts, public btDiscreteDynamicsWorld {
   void computeOverlappingPairs() override {}
 
   bool damped_;
+  double last_step_s_ = 0;  // 0: none since start_anew()
 };
 
 // One robot on the floor.
@@ -139,20 +159,17 @@ class RobotWorld final : public LeanWorld {
 
   // Puts the robot at the start, in a state that no earlier run has touched.
   void reset(const Floor& floor);
-  // One physics step; the last one's impulses, in proportion to the lengths, start the solver.
   void step(const SideSpeeds& speeds, double dt_s);
 
   Robot& robot() { return *robot_; }
 
  private:
-  void solveConstraints(btContactSolverInfo& info) override;
-
   void clear();
   void apply_drag(double dt_s);
-  void prepare_contacts();
+  // Friction and the surface's own speed.
+  void prepare_contacts() override;
 
   SimSettings settings_;
-  double last_step_s_ = 0;  // 0: none since the reset
   Floor floor_;
   btStaticPlaneShape plane_;
   std::unique_ptr<btRigidBody> floor_body_;

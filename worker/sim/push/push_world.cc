@@ -86,8 +86,7 @@ void PushWorld::clear() {
 
 void PushWorld::reset(const Floor& table, const Eigen::Vector2d& velocity, double spin) {
   clear();
-  broadphase.resetPool(&dispatcher);
-  solver.reset();
+  start_anew();
   solver.set_friction_ratio(table.grain_ratio);
   table_ = table;
   const double L = settings_.length_scale;
@@ -211,28 +210,24 @@ double PushWorld::table_friction(const btVector3& on_table, const btVector3& on_
          patch_factor(table_, on_table.x() / L, on_table.y() / L) / std::sqrt(table_.grain_ratio);
 }
 
-void PushWorld::prepare_table_contacts() {
+void PushWorld::prepare_contacts() {
   const btVector3 along(std::cos(table_.grain_direction_rad), std::sin(table_.grain_direction_rad),
                         0);
   const btVector3 across(-along.y(), along.x(), 0);
-  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
-    btPersistentManifold* manifold = dispatcher.getInternalManifoldPointer()[m];
-    for (int i = 0; i < manifold->getNumContacts(); ++i) {
-      btManifoldPoint& point = manifold->getContactPoint(i);
-      const btVector3& at = point.getPositionWorldOnB();
-      point.m_lateralFrictionDir1 = along;
-      point.m_lateralFrictionDir2 = across;
-      point.m_contactCFM = settings_.contact_softness;
-      point.m_contactPointFlags |=
-          BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
-      point.m_combinedRestitution = 0;  // the table does not throw pieces up
-      point.m_combinedFriction = table_friction(at, at - body_->getWorldTransform().getOrigin());
-    }
-  }
+  each_contact(&floor_body_, [&](btManifoldPoint& point, bool /*floor_is_second*/) {
+    const btVector3& at = point.getPositionWorldOnB();
+    point.m_lateralFrictionDir1 = along;
+    point.m_lateralFrictionDir2 = across;
+    point.m_contactCFM = settings_.contact_softness;
+    point.m_contactPointFlags |=
+        BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
+    point.m_combinedRestitution = 0;  // the table does not throw pieces up
+    point.m_combinedFriction = table_friction(at, at - body_->getWorldTransform().getOrigin());
+  });
 }
 
 void PushWorld::solveConstraints(btContactSolverInfo& info) {
-  prepare_table_contacts();
+  prepare_contacts();
   btAlignedObjectArray<btPersistentManifold*> manifolds;
   for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
     manifolds.push_back(dispatcher.getInternalManifoldPointer()[m]);

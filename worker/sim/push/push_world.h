@@ -35,7 +35,7 @@ class PushWorld final : public LeanWorld {
   void solveConstraints(btContactSolverInfo& info) override;
 
   void clear();
-  void prepare_table_contacts();
+  void prepare_contacts() override;
   void place_touch(const Eigen::Vector2d& finger_m, double advance_m, double dt_s);
   double table_friction(const btVector3& on_table, const btVector3& on_piece) const;
 
