@@ -97,16 +97,6 @@ Result<Score> score_of(const v1::TaskResult& result, const FitnessSettings& fitn
   return score;
 }
 
-Result<std::vector<Score>> scores_of(std::span<const v1::TaskResult> results,
-                                     const FitnessSettings& fitness) {
-  std::vector<Score> scores;
-  for (const v1::TaskResult& result : results) {
-    ASSIGN_OR_RETURN(Score score, score_of(result, fitness));
-    scores.push_back(std::move(score));
-  }
-  return scores;
-}
-
 double cost_of_fitness(FitnessKind kind, double fitness) {
   return higher_is_better(kind) ? -fitness : fitness;
 }
@@ -171,25 +161,23 @@ EvolveSummary summarise(const Optimiser& optimiser,
   return summary;
 }
 
-Error wrong_count(std::size_t candidates, std::size_t scores) {
-  return Error{"asked for " + std::to_string(candidates) + " scores, but got " +
-               std::to_string(scores)};
-}
-
-Status EvaluationBackend::stream(std::vector<Candidate> candidates, const TakeScore& take) {
-  for (std::size_t place = 0; !candidates.empty();) {
-    ASSIGN_OR_RETURN(const auto scores, evaluate(candidates));
-    if (scores.size() != candidates.size()) return wrong_count(candidates.size(), scores.size());
-    candidates.clear();
-    for (const Score& score : scores) {
-      ASSIGN_OR_RETURN(const auto more, take(place++, score));
-      candidates.insert(candidates.end(), more.begin(), more.end());
-    }
-  }
-  return {};
-}
-
 namespace {
+
+// In the candidates' order.
+Result<std::vector<Score>> scores_of(EvaluationBackend& backend,
+                                     std::vector<Candidate> candidates) {
+  const std::size_t asked = candidates.size();
+  std::size_t got = 0;
+  std::vector<Score> scores(asked);
+  const auto take = [&](std::size_t place, const Score& score) {
+    scores.at(place) = score;
+    ++got;
+    return Result<std::vector<Candidate>>(std::vector<Candidate>());
+  };
+  RETURN_IF_ERROR(backend.stream(std::move(candidates), take));
+  if (got == asked) return scores;
+  return Error{"asked for " + std::to_string(asked) + " scores, but got " + std::to_string(got)};
+}
 
 // Islands that go on one by one.
 class IslandLoop {
@@ -278,8 +266,8 @@ class IslandLoop {
 Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
                              const EvolveClock& clock, const EvolveOptions& options,
                              const std::function<bool()>& stop_requested) {
-  const double began_s = clock.now_s();
-  const auto spent_s = [&] { return options.spent_s + clock.now_s() - began_s; };
+  const double began_s = clock();
+  const auto spent_s = [&] { return options.spent_s + clock() - began_s; };
   const auto requested = [&] { return stop_requested && stop_requested(); };
 
   if (optimiser.islands() != nullptr) {
@@ -299,24 +287,20 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, G
     auto stop = reason_to_stop(optimiser, options, spent_s(), requested());
     if (stop) return summarise(optimiser, *stop, spent_s());
 
-    const double generation_began_s = clock.now_s();
+    const double generation_began_s = clock();
     const std::uint64_t generation = optimiser.generation();
     while (optimiser.generation() == generation) {
-      const std::vector<Candidate> candidates = optimiser.ask();
-      const Result<std::vector<Score>> scores = backend.evaluate(candidates);
+      const auto scores = scores_of(backend, optimiser.ask());
       if (!scores && requested()) {
         stop = reason_to_stop(optimiser, options, spent_s(), true);
         return summarise(optimiser, *stop, spent_s());
       }
       if (!scores) return scores.error();
-      if (scores->size() != candidates.size()) {
-        return wrong_count(candidates.size(), scores->size());
-      }
       optimiser.tell(*scores);
     }
 
     GenerationRecord record = record_generation(optimiser);
-    record.wall_s = clock.now_s() - generation_began_s;
+    record.wall_s = clock() - generation_began_s;
     RETURN_IF_ERROR(sink.commit(record));
   }
 }

@@ -21,19 +21,18 @@ namespace gapfarm {
 double cost_of_fitness(FitnessKind kind, double fitness);
 double fitness_of_cost(FitnessKind kind, double cost);
 
-// Scores candidates; one score a candidate, in their order.  An error ends the run, unless a stop
-// was requested: then the generation is dropped, to be asked again after a resume.
+// Scores candidates.  An error ends the run, unless a stop was requested: then the generation is
+// dropped, to be asked again after a resume.
 class EvaluationBackend {
  public:
   virtual ~EvaluationBackend() = default;
-  virtual Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) = 0;
 
   // Takes a score by its candidate's place, counted over the call, and says what else to score.
   using TakeScore =
       std::function<Result<std::vector<Candidate>>(std::size_t place, const Score& score)>;
   // Every score goes to `take` when it is there, in any order.  Ends when nothing is left to score,
   // or with an error of `take`.
-  virtual Status stream(std::vector<Candidate> candidates, const TakeScore& take);
+  virtual Status stream(std::vector<Candidate> candidates, const TakeScore& take) = 0;
 };
 
 struct GenerationRecord {
@@ -55,12 +54,8 @@ class GenerationSink {
 
 constexpr std::uint64_t kMostAhead = 16;  // generations of an island
 
-// Seconds of a clock that never goes back.  Nothing stops by this one's time.
-class EvolveClock {
- public:
-  virtual ~EvolveClock() = default;
-  virtual double now_s() const { return 0; }
-};
+// Seconds of a clock that never goes back.
+using EvolveClock = std::function<double()>;
 
 enum class StopReason {
   kRequested,
@@ -111,8 +106,6 @@ GenerationRecord record_generation(const Optimiser& optimiser);
 EvolveSummary summarise(const Optimiser& optimiser,
                         const std::pair<StopReason, std::string>& reason, double wall_s);
 
-Error wrong_count(std::size_t candidates, std::size_t scores);
-
 // Between the optimisers and the workers: a problem to an optimiser, candidates to tasks, results
 // to scores.
 
@@ -124,8 +117,6 @@ v1::Task evaluation_task(const Candidate& candidate, std::uint64_t run_seed);
 
 // Errors: a worker refused the evaluation, or did not answer with a number an objective.
 Result<Score> score_of(const v1::TaskResult& result, const FitnessSettings& fitness);
-Result<std::vector<Score>> scores_of(std::span<const v1::TaskResult> results,
-                                     const FitnessSettings& fitness);
 
 // How long a run will still take.
 

@@ -30,21 +30,51 @@ constexpr FarmKindName kComingsAndGoings[] = {
     {FarmEvent::kSilent, "silent"},     {FarmEvent::kDied, "died"},
     {FarmEvent::kBadMessage, "refused"}};
 
-// The last of what a user's program had no answer to, and how many there are; else empty.
-std::string failures_among(const Problem& problem, const std::vector<v1::Task>& tasks,
-                           const std::vector<v1::TaskResult>& results) {
-  std::size_t failed = 0, last = 0;
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    if (results[i].outcome() != v1::DIVERGED) continue;
-    ++failed;
-    last = i;
+// What a user's program had no answer to since the last note, and the last that was asked of that.
+class FailureNotes {
+ public:
+  // One note for `at_once` answers.
+  FailureNotes(const Problem& problem, FarmProgressWriter& progress, std::size_t at_once)
+      : problem_(problem), progress_(progress), at_once_(at_once) {}
+
+  void asked(const std::vector<v1::Task>& tasks) {
+    if (!problem_.external) return;
+    for (const v1::Task& task : tasks) out_[next_place_++] = task;
   }
-  if (failed == 0) return {};
-  const std::string& why = results[last].message();
-  return std::to_string(failed) + " of " + std::to_string(results.size()) +
-         " evaluations failed: " + task_label(tasks[last]) + ": " +
-         (why.empty() ? "diverged" : why) + "; " + point_settings(problem, tasks[last]);
-}
+
+  void answered(std::size_t place, const v1::TaskResult& result) {
+    if (!problem_.external) return;
+    const v1::Task task = std::move(out_.extract(place).mapped());
+    ++answered_;
+    if (result.outcome() == v1::DIVERGED) {
+      ++failed_;
+      if (place >= last_place_) {
+        last_place_ = place;
+        last_ = task_label(task) + ": " +
+                (result.message().empty() ? "diverged" : result.message()) + "; " +
+                point_settings(problem_, task);
+      }
+    }
+    if (answered_ >= at_once_) note();
+  }
+
+  void note() {
+    if (failed_ > 0) {
+      progress_.on_failures(std::to_string(failed_) + " of " + std::to_string(answered_) +
+                            " evaluations failed: " + last_);
+    }
+    answered_ = failed_ = last_place_ = 0;
+  }
+
+ private:
+  const Problem& problem_;
+  FarmProgressWriter& progress_;
+  std::size_t at_once_;
+  std::unordered_map<std::size_t, v1::Task> out_;  // by place
+  std::size_t next_place_ = 0;
+  std::size_t answered_ = 0, failed_ = 0, last_place_ = 0;
+  std::string last_;
+};
 
 }  // namespace
 
@@ -82,7 +112,7 @@ FarmProgressWriter::FarmProgressWriter(RunStore& store, Farm& farm,
       settings_(settings),
       clock_(clock),
       watcher_(watcher),
-      began_s_(clock.now_s()),
+      began_s_(clock()),
       wait_(farm.endpoints()) {
   last_.listens(farm);
   if (!resumed) return;
@@ -97,10 +127,12 @@ Progress FarmProgressWriter::now() const {
   return progress;
 }
 
-void FarmProgressWriter::on_progress(const FarmProgress& progress) {
-  last_.done = progress.done;
-  last_.total = progress.total;
-  refresh(clock_.now_s());
+void FarmProgressWriter::on_progress(const FarmProgress& progress,
+                                     std::uint64_t evaluations_before) {
+  const std::uint64_t committed = evaluations_before_ - evaluations_before;
+  last_.done = progress.done - committed;
+  last_.total = progress.total - committed;
+  refresh(clock_());
 }
 
 void FarmProgressWriter::watch(Log* log, FarmEventKeeper* events) {
@@ -123,7 +155,7 @@ void FarmProgressWriter::on_generation(const GenerationRecord& record, std::opti
     }
     log_->write(LogLevel::kInfo, "generation committed", fields);
   }
-  refresh(clock_.now_s());
+  refresh(clock_());
 }
 
 void FarmProgressWriter::on_failures(const std::string& text) {
@@ -179,59 +211,27 @@ FarmBackend::FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed,
   problem_hash_ = farm.add_problem(to_proto(problem));
 }
 
-std::vector<v1::Task> FarmBackend::tasks_of(std::span<const Candidate> candidates) const {
-  std::vector<v1::Task> tasks = mapped(
-      candidates, [&](const Candidate& candidate) { return evaluation_task(candidate, seed_); });
-  return tasks;
-}
-
-void FarmBackend::note_failures(const std::vector<v1::Task>& tasks,
-                                const std::vector<v1::TaskResult>& results) {
-  if (!problem_.external) return;
-  const std::string failures = failures_among(problem_, tasks, results);
-  if (!failures.empty()) progress_.on_failures(failures);
-}
-
 Status FarmBackend::stream(std::vector<Candidate> candidates, const TakeScore& take) {
-  // What is out, by place, where failures name the task; and what came back since the last note.
-  std::unordered_map<std::size_t, v1::Task> out;
-  std::vector<v1::Task> answered;
-  std::vector<v1::TaskResult> answers;
-  std::size_t next_place = 0;
-  const std::size_t at_once = candidates.size();
-  const auto sent = [&](std::vector<v1::Task> tasks) {
-    for (const v1::Task& task : tasks) {
-      if (problem_.external) out[next_place++] = task;
-    }
+  FailureNotes failures(problem_, progress_, candidates.size());
+  const std::uint64_t before = progress_.evaluations_before();
+  const auto sent = [&](std::span<const Candidate> all) {
+    std::vector<v1::Task> tasks =
+        mapped(all, [&](const Candidate& candidate) { return evaluation_task(candidate, seed_); });
+    failures.asked(tasks);
     return tasks;
   };
   const auto on_answer = [&](std::size_t place,
                              const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
-    if (problem_.external) {
-      answered.push_back(std::move(out.extract(place).mapped()));
-      answers.push_back(result);
-    }
-    if (answers.size() >= at_once) {
-      note_failures(std::exchange(answered, {}), std::exchange(answers, {}));
-    }
+    failures.answered(place, result);
     ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness));
     ASSIGN_OR_RETURN(const auto next, take(place, score));
-    return sent(tasks_of(next));
+    return sent(next);
   };
   const Status status =
-      farm_.stream(problem_hash_, sent(tasks_of(candidates)), on_answer,
-                   [&](const FarmProgress& progress) { progress_.on_stream(progress); });
-  note_failures(answered, answers);
+      farm_.stream(problem_hash_, sent(candidates), on_answer,
+                   [&](const FarmProgress& progress) { progress_.on_progress(progress, before); });
+  failures.note();
   return status;
-}
-
-Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> candidates) {
-  const std::vector<v1::Task> tasks = tasks_of(candidates);
-  ASSIGN_OR_RETURN(const auto results, farm_.run(problem_hash_, tasks, [&](const FarmProgress& p) {
-    progress_.on_progress(p);
-  }));
-  note_failures(tasks, results);
-  return scores_of(results, problem_.fitness);
 }
 
 Status StoreSink::commit(const GenerationRecord& record) {

@@ -59,11 +59,10 @@ class FarmProgressWriter {
                      const std::optional<Checkpoint>& resumed, const EvolveClock& clock,
                      RunWatcher& watcher);
 
-  void on_progress(const FarmProgress& progress);
-  // Of all that one batch did since the present master started.
-  void on_stream(const FarmProgress& progress) {
-    on_progress({progress.done - evaluations_before_, progress.total - evaluations_before_});
-  }
+  // Evaluations of the generations that this life of the master has committed.
+  std::uint64_t evaluations_before() const { return evaluations_before_; }
+  // Of what was asked when there were so many of these.
+  void on_progress(const FarmProgress& progress, std::uint64_t evaluations_before);
   void on_generation(const GenerationRecord& record, std::optional<double> best);
   // Evaluations of the generation in work that a user's program had no answer to, in a sentence.
   void on_failures(const std::string& text);
@@ -102,14 +101,9 @@ class FarmProgressWriter {
 class FarmBackend : public EvaluationBackend {
  public:
   FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed, FarmProgressWriter& progress);
-  Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override;
   Status stream(std::vector<Candidate> candidates, const TakeScore& take) override;
 
  private:
-  std::vector<v1::Task> tasks_of(std::span<const Candidate> candidates) const;
-  void note_failures(const std::vector<v1::Task>& tasks,
-                     const std::vector<v1::TaskResult>& results);
-
   Farm& farm_;
   const Problem& problem_;
   std::uint64_t seed_;

@@ -17,11 +17,6 @@
 namespace gapfarm {
 namespace {
 
-class SteadyClock : public EvolveClock {
- public:
-  double now_s() const override { return monotonic_seconds(); }
-};
-
 // What a run begins with, read before any farm is there.
 struct RunInputs {
   std::optional<Checkpoint> checkpoint;
@@ -148,7 +143,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
     if (!note.empty()) watcher.note(note);
   }
 
-  const SteadyClock clock;
+  const EvolveClock clock = monotonic_seconds;
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,
                               watcher);
   progress.watch(&request.log, &events);

@@ -22,25 +22,13 @@ namespace {
 
 constexpr std::uint64_t kFirst = 4, kLast = 16;  // generations between which is measured
 
-class VirtualFarm : public EvaluationBackend, public EvolveClock {
+class VirtualFarm : public EvaluationBackend {
  public:
   VirtualFarm(const ToyRun& run, unsigned workers, double sigma, unsigned window)
       : run_(run), farm_(1, workers, without_faults(window)), sigma_(sigma) {}
 
-  double now_s() const override { return farm_.now(); }
+  double now_s() const { return farm_.now(); }
   double worked_s() const { return worked_s_; }
-
-  Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override {
-    std::vector<v1::Task> tasks;
-    std::vector<Score> scores;
-    for (const Candidate& candidate : candidates) {
-      tasks.push_back(task_of(candidate));
-      scores.push_back(run_.score(candidate));
-    }
-    if (farm_.run(tasks, 1, kLimit_s).size() != tasks.size()) return Error{"not done"};
-    for (const v1::Task& task : tasks) worked_s_ += time_of(task);
-    return scores;
-  }
 
   Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
     std::vector<Score> scores;
@@ -122,7 +110,10 @@ void tail(benchmark::State& state) {
     EvolveOptions options;
     options.settings = settings;
     options.fitness = FitnessKind::kEnergyScore;
-    benchmark::DoNotOptimize(evolve(run.optimiser(), farm, watch, farm, options).ok());
+    benchmark::DoNotOptimize(
+        evolve(
+            run.optimiser(), farm, watch, [&] { return farm.now_s(); }, options)
+            .ok());
     state.counters["efficiency"] = watch.busy_workers() / workers;
   }
 }

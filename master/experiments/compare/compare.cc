@@ -149,9 +149,10 @@ CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
         return evaluation_task(requests[i].candidate, requests[i].seed);
       });
       ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
-      ASSIGN_OR_RETURN(const auto scored,
-                       scores_of(results, fitness[requests[members.front()].variant]));
-      for (std::size_t k = 0; k < members.size(); ++k) scores[members[k]] = scored[k];
+      const FitnessSettings& settings = fitness[requests[members.front()].variant];
+      for (std::size_t k = 0; k < members.size(); ++k) {
+        ASSIGN_OR_RETURN(scores[members[k]], score_of(results[k], settings));
+      }
     }
     return scores;
   };

@@ -6,6 +6,7 @@
 #include <map>
 #include <tuple>
 
+#include "common/base/clock.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
@@ -232,11 +233,17 @@ class Backend : public EvaluationBackend {
     hash_ = farm.add_problem(to_proto(problem));
   }
 
-  Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override {
-    const auto tasks =
-        mapped(candidates, [&](const Candidate& c) { return evaluation_task(c, seed_); });
-    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
-    return scores_of(results, fitness_);
+  Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
+    const auto tasks_of = [&](std::span<const Candidate> of) {
+      return mapped(of, [&](const Candidate& c) { return evaluation_task(c, seed_); });
+    };
+    return farm_.stream(
+        hash_, tasks_of(candidates),
+        [&](std::size_t place, const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
+          ASSIGN_OR_RETURN(const Score score, score_of(result, fitness_));
+          ASSIGN_OR_RETURN(const auto more, take(place, score));
+          return tasks_of(more);
+        });
   }
 
  private:
@@ -301,11 +308,11 @@ Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& set
   ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
   Backend backend(problem, farm, settings.seed);
   GenerationSink sink;
-  const EvolveClock clock;
   EvolveOptions options;
   options.settings = settings.evolution;
   options.fitness = problem.fitness.kind;
-  ASSIGN_OR_RETURN(const auto summary, evolve(*optimiser, backend, sink, clock, options));
+  ASSIGN_OR_RETURN(const auto summary,
+                   evolve(*optimiser, backend, sink, monotonic_seconds, options));
   if (!summary.best || summary.best->standing.outcome != v1::OK) {
     return Error{"every genome failed; widen or move the genes' ranges"};
   }

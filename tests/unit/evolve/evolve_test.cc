@@ -8,24 +8,20 @@
 
 namespace gapfarm::evolve_test {
 
-class FakeClock : public EvolveClock {
- public:
-  double now_s() const override { return now; }
-  double now = 100;
-};
-
 // Scores by a toy; each generation takes 2 s of the fake clock.
 class ToyBackend : public EvaluationBackend {
  public:
-  ToyBackend(const ToyRun& run, FakeClock& clock) : run_(run), clock_(clock) {}
-  Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override {
-    clock_.now += 2;
+  ToyBackend(const ToyRun& run, double& clock) : run_(run), clock_(clock) {}
+  Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
+    clock_ += 2;
     if (on_call) on_call();
     if (fail) return Error{"no worker can be had"};
-    std::vector<Score> scores;
-    for (const Candidate& candidate : candidates) scores.push_back(run_.score(candidate));
-    if (lose_one) scores.pop_back();
-    return scores;
+    if (lose_one) candidates.pop_back();
+    for (std::size_t place = 0; place < candidates.size(); ++place) {
+      ASSIGN_OR_RETURN(const auto more, take(place, run_.score(candidates[place])));
+      candidates.insert(candidates.end(), more.begin(), more.end());
+    }
+    return {};
   }
   std::function<void()> on_call;
   bool fail = false;
@@ -33,7 +29,7 @@ class ToyBackend : public EvaluationBackend {
 
  private:
   const ToyRun& run_;
-  FakeClock& clock_;
+  double& clock_;
 };
 
 class KeepingSink : public GenerationSink {
@@ -57,7 +53,7 @@ std::vector<std::string> digests(const std::vector<GenerationRecord>& records) {
 
 class EvolveTest : public testing::Test {
  protected:
-  explicit EvolveTest() : backend_(run_, clock_) {
+  explicit EvolveTest() : backend_(run_, now_) {
     options_.settings = run_.setup().settings;
     options_.settings.generations = 12;
     options_.fitness = FitnessKind::kEnergyScore;
@@ -67,7 +63,8 @@ class EvolveTest : public testing::Test {
   }
 
   ToyRun run_{sphere(3), EvolutionSettings{}, 1};
-  FakeClock clock_;
+  double now_ = 100;
+  EvolveClock clock_ = [this] { return now_; };
   ToyBackend backend_;
   KeepingSink sink_;
   EvolveOptions options_;
@@ -171,7 +168,7 @@ TEST_F(EvolveTest, DigestsIgnoreTimeAndShowSeedsApart) {
   ASSERT_TRUE(go());
   const std::vector<std::string> whole = digests(sink_.records);
   ToyRun same(sphere(3), EvolutionSettings{}, 1), other(sphere(3), EvolutionSettings{}, 2);
-  backend_.on_call = [&] { clock_.now += 5; };
+  backend_.on_call = [&] { now_ += 5; };
   KeepingSink of_same, of_other;
   ASSERT_TRUE(evolve(same.optimiser(), backend_, of_same, clock_, options_));
   ASSERT_TRUE(evolve(other.optimiser(), backend_, of_other, clock_, options_));

@@ -18,10 +18,7 @@ namespace gapfarm::islands_test {
 using testing::HasSubstr;
 using testing::SizeIs;
 
-class NoClock : public EvolveClock {
- public:
-  double now_s() const override { return 0; }
-};
+double no_clock() { return 0; }
 
 class Keeping : public GenerationSink {
  public:
@@ -40,9 +37,6 @@ class Unordered : public EvaluationBackend {
   Unordered(const ToyRun& run, unsigned seed, double fifo)
       : run_(run), random_(seed), fifo_(fifo) {}
 
-  Result<std::vector<Score>> evaluate(std::span<const Candidate>) override {
-    return Error{"not one by one"};
-  }
   Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
     std::vector<std::pair<std::size_t, Candidate>> out;
     const auto send = [&](const std::vector<Candidate>& more) {
@@ -114,7 +108,7 @@ class AnyOrder : public testing::TestWithParam<Case> {
     Keeping sink;
     EvolveOptions options;
     options.settings = settings;
-    EXPECT_TRUE(evolve(run.optimiser(), backend, sink, NoClock(), options).ok());
+    EXPECT_TRUE(evolve(run.optimiser(), backend, sink, no_clock, options).ok());
     EXPECT_EQ(backend.asked, sink.evaluations) << "nothing is scored that no generation needs";
     return sink.digests;
   }
@@ -219,7 +213,7 @@ TEST(Islands, StopAtEvaluationsWithoutDoingMore) {
   Keeping sink;
   EvolveOptions options;
   options.settings = settings;
-  EXPECT_EQ(evolve(run.optimiser(), backend, sink, NoClock(), options).value().reason,
+  EXPECT_EQ(evolve(run.optimiser(), backend, sink, no_clock, options).value().reason,
             StopReason::kEvaluations);
   EXPECT_EQ(backend.asked, sink.evaluations);
   EXPECT_THAT(sink.digests, SizeIs(4));
