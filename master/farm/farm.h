@@ -4,10 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -94,9 +94,6 @@ inline constexpr std::array<FarmTally::Row, 13> FarmTally::kRows = {{
     {"dropped_links", &FarmTally::dropped_links, "of them closed by the limits"},
 }};
 
-// Reported an answer by its place in the batch.
-using AnswerWatcher = std::function<void(std::size_t task, const v1::TaskResult& result)>;
-
 class Farm {
  public:
   virtual ~Farm() = default;
@@ -104,34 +101,30 @@ class Farm {
   // Makes a problem known to the farm; workers fetch it once.  Returns its hash.
   virtual std::string add_problem(const v1::Problem& problem) = 0;
 
-  // Runs every task and returns the results in the tasks' order.  `on_progress` (may be empty) is
-  // called now and then from this thread.  Errors: stopped by request, or no worker can be had.
-  virtual Result<std::vector<v1::TaskResult>> run(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress = {}) = 0;
-
   // Takes an answer by its task's place, counted over the call, and says what else to do.
   using TakeAnswer =
-      std::function<Result<std::vector<v1::Task>>(std::size_t place, const v1::TaskResult& result)>;
-  // As run(), but every answer goes to `take` when it is there, in any order, and the tasks that it
-  // returns are done, too.  Ends when nothing is left to do, or with an error of `take`.
+      std::function<Result<std::vector<v1::Task>>(std::size_t place, v1::TaskResult result)>;
+  using OnProgress = std::function<void(const FarmProgress&)>;
+  // Runs every task: each answer goes to `take` when it is there, in any order, and the tasks that
+  // it returns are done, too.  `on_progress` (may be empty) is called now and then from this
+  // thread.  Ends when nothing is left to do.  Errors: stopped by request, no worker can be had, or
+  // `take`'s.
   virtual Status stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
-                        const TakeAnswer& take,
-                        const std::function<void(const FarmProgress&)>& on_progress = {}) {
-    for (std::size_t place = 0; !tasks.empty();) {
-      ASSIGN_OR_RETURN(const auto results, run(problem_hash, tasks, on_progress));
-      tasks.clear();
-      for (const v1::TaskResult& result : results) {
-        ASSIGN_OR_RETURN(auto more, take(place++, result));
-        std::move(more.begin(), more.end(), std::back_inserter(tasks));
-      }
-    }
-    return {};
+                        const TakeAnswer& take, const OnProgress& on_progress = {}) = 0;
+
+  // The results in the tasks' order.
+  Result<std::vector<v1::TaskResult>> run(const std::string& problem_hash,
+                                          std::vector<v1::Task> tasks,
+                                          const OnProgress& on_progress = {}) {
+    std::vector<v1::TaskResult> results(tasks.size());
+    const auto take = [&](std::size_t place, v1::TaskResult result) {
+      results[place] = std::move(result);
+      return Result<std::vector<v1::Task>>(std::vector<v1::Task>());
+    };
+    RETURN_IF_ERROR(stream(problem_hash, std::move(tasks), take, on_progress));
+    return results;
   }
 
-  // From now on every answer is shown to `watcher`, before the run() that asked returns or fails.
-  // Empty: nobody.
-  virtual void watch_answers(AnswerWatcher /*watcher*/) {}
   virtual std::vector<WorkerStatus> workers() const { return {}; }
   // Those whose workers stand on clusters for it.
   virtual std::vector<FleetStatus> fleets() const { return {}; }
@@ -143,7 +136,7 @@ class Farm {
   virtual std::string numeric_class() const { return {}; }
 };
 
-// What run() returns when a stop was requested; its code is kStopped.
+// What stream() returns when a stop was requested; its code is kStopped.
 inline Error stop_requested() { return {"stopped by request", ErrorCode::kStopped}; }
 
 // To predict the ends of a problem's trials at a point; scores and covariances are dearer.

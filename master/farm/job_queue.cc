@@ -1,9 +1,7 @@
 #include "master/farm/job_queue.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
-#include <random>
 
 #include "common/base/ranges.h"
 #include "common/problem/problem.h"
@@ -55,17 +53,9 @@ bool is_answer(const v1::TaskResult& result) {
 
 void JobQueue::start(std::string problem_hash, std::vector<v1::Task> tasks,
                      std::optional<std::uint64_t> shuffle_seed) {
-  abandon();
+  end();
   problem_hash_ = std::move(problem_hash);
-  jobs_.resize(tasks.size());
-  for (std::size_t i = 0; i < tasks.size(); ++i) jobs_[i].task = std::move(tasks[i]);
-  std::vector<std::size_t> order = indices(jobs_.size());
-  if (shuffle_seed) {
-    // Fisher-Yates by hand: the order of std::shuffle differs between libraries.
-    std::mt19937_64 random(*shuffle_seed ^ first_job_);
-    for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random() % i]);
-  }
-  pending_.assign(order.begin(), order.end());
+  append(std::move(tasks), shuffle_seed);
 }
 
 void JobQueue::wait_in_line(std::size_t index) {
@@ -180,7 +170,7 @@ Committed JobQueue::commit(const WorkerIdentityPtr& worker, v1::JobResult* resul
   Committed committed;
   if (result->result().outcome() == v1::WORKER_UNFIT) committed.kind = Commit::kUnfit;
   if (!is_answer(result->result())) return committed;
-  if (opinions_.compare(worker, *result, &committed.disagreement)) {
+  if (opinions_.take_expected(worker, *result, &committed.disagreement)) {
     committed.kind = Commit::kCompared;
     return committed;
   }
@@ -194,13 +184,7 @@ Committed JobQueue::commit(const WorkerIdentityPtr& worker, v1::JobResult* resul
   if (attempt->live) withdraw(*attempt, id);
   note_wall(result->wall());
   Job& job = jobs_[attempt->job];
-  if (job.done) {
-    committed.kind = Commit::kLate;
-    look_for_late(&committed.disagreement, job, worker, result->result());
-    return committed;
-  }
-  committed.kind = Commit::kDone;
-  accept(job, result->mutable_result(), worker, &committed.losers);
+  accept(job, result->mutable_result(), worker, &committed);
   return committed;
 }
 
@@ -215,39 +199,31 @@ Committed JobQueue::commit_question(const WorkerIdentityPtr& worker, const std::
   }
   const auto found = questions_.find(question);
   if (found == questions_.end()) return committed;
-  Job& job = jobs_[found->second];
-  if (job.done) {
-    committed.kind = Commit::kLate;
-    look_for_late(&committed.disagreement, job, worker, *result);
-    return committed;
-  }
-  committed.kind = Commit::kDone;
-  accept(job, result, worker, &committed.losers);
+  accept(jobs_[found->second], result, worker, &committed);
   return committed;
 }
 
-void JobQueue::accept(Job& job, v1::TaskResult* result, const WorkerIdentityPtr& worker,
-                      Losers* losers) {
-  job.result.Swap(result);
-  job.answered_by = worker;
-  if (watcher_) watcher_(index_of(job), job.result);
-  const std::uint64_t id = first_job_ + index_of(job);
-  if (chosen_for_audit(job.task, id, copies_.audit_share)) {
-    opinions_.audit(taken_answer(job.task, job.result, worker), problem_hash_, job.task, id);
-  }
-  complete(job, losers);
+TakenAnswer JobQueue::taken_answer(const Job& job) const {
+  return {task_label(job.task), job.answer_hash, job.answered_by};
 }
 
-void JobQueue::look_for_late(std::optional<Disagreement>* disagreement, const Job& job,
-                             const WorkerIdentityPtr& worker, const v1::TaskResult& result) {
-  // A message that came twice is no second opinion.
-  if (!job.answered_by || job.answered_by->name == worker->name ||
-      job.answered_by->numeric_class != worker->numeric_class) {
+void JobQueue::accept(Job& job, v1::TaskResult* result, const WorkerIdentityPtr& worker,
+                      Committed* committed) {
+  if (job.done) {
+    committed->kind = Commit::kLate;
+    // A message that came twice is no second opinion.
+    if (!job.answered_by || job.answered_by->name == worker->name) return;
+    committed->disagreement = opinions_.compare(taken_answer(job), *result, worker);
     return;
   }
-  ++compared_;
-  if (result.SerializeAsString() == job.result.SerializeAsString()) return;
-  *disagreement = Disagreement{task_label(job.task), job.answered_by, worker};
+  committed->kind = Commit::kDone;
+  job.answer_hash = answer_hash(*result);
+  job.answered_by = worker;
+  const std::uint64_t id = first_job_ + index_of(job);
+  if (chosen_for_audit(job.task, id, copies_.audit_share)) {
+    opinions_.audit(taken_answer(job), problem_hash_, job.task, id);
+  }
+  complete(job, result, &committed->losers);
 }
 
 void JobQueue::note_wall(double wall) {
@@ -255,10 +231,10 @@ void JobQueue::note_wall(double wall) {
   mean_wall_ = mean_wall_ < 0 ? wall : mean_wall_ + 0.05 * (wall - mean_wall_);
 }
 
-void JobQueue::complete(Job& job, Losers* losers) {
+void JobQueue::complete(Job& job, v1::TaskResult* result, Losers* losers) {
   job.done = true;
   ++committed_;
-  fresh_.push_back(index_of(job));
+  fresh_.emplace_back(forgotten_ + index_of(job), std::move(*result));
   // It waits when its attempt was given up too early and answered after all.
   leave_line(index_of(job));
   for (std::uint64_t attempt : job.out) {
@@ -316,29 +292,22 @@ Blamed JobQueue::blame(const WorkerIdentity& worker, std::uint64_t attempt_id, E
   blamed.quarantined = true;
   blamed.reason = reason(job, faults);
   blamed.task = job.task;
-  job.result.set_outcome(v1::WORKER_FAILED);
-  job.result.set_message(blamed.reason);
-  complete(job, &blamed.losers);
+  v1::TaskResult result;
+  result.set_outcome(v1::WORKER_FAILED);
+  result.set_message(blamed.reason);
+  complete(job, &result, &blamed.losers);
   return blamed;
 }
 
-std::vector<v1::TaskResult> JobQueue::finish() {
-  assert(unfinished() == 0);
+void JobQueue::end() {
   for (std::size_t i = oldest_; i < attempts_.size(); ++i) {
     const Attempt& attempt = attempts_[i];
     if (!attempt.live) continue;
     const Job& job = jobs_[attempt.job];
     if (!job.answered_by) continue;
     opinions_.expect(first_attempt_ + i, first_job_ + attempt.job, attempt.worker,
-                     taken_answer(job.task, job.result, job.answered_by));
+                     taken_answer(job));
   }
-  std::vector<v1::TaskResult> results(jobs_.size());
-  for (std::size_t i = 0; i < jobs_.size(); ++i) results[i].Swap(&jobs_[i].result);
-  abandon();
-  return results;
-}
-
-void JobQueue::abandon() {
   first_job_ += jobs_.size();
   first_attempt_ += attempts_.size();
   jobs_.clear();

@@ -75,7 +75,7 @@ class JobQueue {
   // More tasks of the batch; their places count on.  What has long been done is forgotten, so that
   // a batch may go on for ever.  REQUIRES: take_answers() was called since the last answer.
   void append(std::vector<v1::Task> tasks, std::optional<std::uint64_t> shuffle_seed = {});
-  // What was completed since the last call, by its place.
+  // What was completed since the last call, by its place, in the order of the answers.
   std::vector<std::pair<std::size_t, v1::TaskResult>> take_answers();
 
   bool has_pending() const {
@@ -110,18 +110,12 @@ class JobQueue {
   Blamed blame(const WorkerIdentity& worker, std::uint64_t attempt, EndCause cause,
                const std::string& failure = "");
 
-  // The results in the order of the tasks; after append() of the last of them.  REQUIRES:
-  // unfinished() == 0.  Ends the batch.
-  std::vector<v1::TaskResult> finish();
-  // Ends the batch without results.
-  void abandon();
-
-  // Called with the place and the answer of every job that a worker answers.
-  void watch_answers(AnswerWatcher watcher) { watcher_ = std::move(watcher); }
+  // Ends the batch, whose answers were taken or are not wanted.
+  void end();
 
   // Of evaluations, lately; negative: none has come back yet.
   double mean_wall() const { return mean_wall_; }
-  std::uint64_t compared() const { return opinions_.compared() + compared_; }
+  std::uint64_t compared() const { return opinions_.compared(); }
   std::uint64_t copied() const { return copied_; }
 
  private:
@@ -130,8 +124,8 @@ class JobQueue {
   static constexpr std::size_t kNoJob = static_cast<std::size_t>(-1);
   struct Job {
     v1::Task task;
-    v1::TaskResult result;
-    WorkerIdentityPtr answered_by;
+    std::string answer_hash;
+    WorkerIdentityPtr answered_by;                 // null: by nobody yet, or by the master
     std::array<std::uint64_t, kMostCopies> out{};  // live attempts; 0: none
     bool done = false;
     bool waiting = true;  // in pending_ or retries_
@@ -162,11 +156,11 @@ class JobQueue {
   double patience() const;
   void wait_in_line(std::size_t index);
   void leave_line(std::size_t index);
-  void accept(Job& job, v1::TaskResult* result, const WorkerIdentityPtr& worker, Losers* losers);
-  void complete(Job& job, Losers* losers);
+  TakenAnswer taken_answer(const Job& job) const;
+  void accept(Job& job, v1::TaskResult* result, const WorkerIdentityPtr& worker,
+              Committed* committed);
+  void complete(Job& job, v1::TaskResult* result, Losers* losers);
   void note_wall(double wall);
-  void look_for_late(std::optional<Disagreement>* disagreement, const Job& job,
-                     const WorkerIdentityPtr& worker, const v1::TaskResult& result);
   std::string reason(const Job& job, const std::vector<Fault>& faults) const;
 
   JobLimits limits_;
@@ -182,13 +176,11 @@ class JobQueue {
   std::unordered_map<std::string, std::size_t> questions_;      // to job; made when first needed
   std::size_t oldest_ = 0;                                      // no older attempt is live
   std::size_t committed_ = 0;                                   // of jobs_
-  std::vector<std::size_t> fresh_;  // completed and not taken by take_answers()
-  std::size_t over_ = 0;            // no earlier job will be looked at again
-  std::size_t forgotten_ = 0;       // jobs of this batch
+  std::vector<std::pair<std::size_t, v1::TaskResult>> fresh_;   // see take_answers()
+  std::size_t over_ = 0;       // no earlier job will be looked at again
+  std::size_t forgotten_ = 0;  // jobs of this batch
   double mean_wall_ = -1;
   SecondOpinions opinions_;
-  AnswerWatcher watcher_;
-  std::uint64_t compared_ = 0;
   std::uint64_t copied_ = 0;
 };
 

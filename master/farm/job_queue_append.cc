@@ -19,12 +19,7 @@ void JobQueue::append(std::vector<v1::Task> tasks, std::optional<std::uint64_t> 
 }
 
 std::vector<std::pair<std::size_t, v1::TaskResult>> JobQueue::take_answers() {
-  std::vector<std::pair<std::size_t, v1::TaskResult>> answers;
-  for (const std::size_t index : fresh_) {
-    answers.emplace_back(forgotten_ + index, jobs_[index].result);
-  }
-  fresh_.clear();
-  return answers;
+  return std::exchange(fresh_, {});
 }
 
 // The jobs at the front that are done and out with nobody, once they are the greater part.

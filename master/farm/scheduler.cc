@@ -88,14 +88,9 @@ std::string Scheduler::values_of_task(const v1::Task& task) const {
          settings;
 }
 
-std::vector<v1::TaskResult> Scheduler::finish() {
+void Scheduler::end() {
   cancel_all();
-  return queue_.finish();
-}
-
-void Scheduler::abandon() {
-  cancel_all();
-  queue_.abandon();
+  queue_.end();
 }
 
 // What is still out has been answered by others or is not wanted any more.  Who works on it says

@@ -87,9 +87,7 @@ class Scheduler {
   }
   bool finished() const { return queue_.unfinished() == 0; }
   FarmProgress progress() const { return {queue_.committed(), queue_.total()}; }
-  std::vector<v1::TaskResult> finish();  // REQUIRES: finished()
-  void abandon();
-  void watch_answers(AnswerWatcher watcher) { queue_.watch_answers(std::move(watcher)); }
+  void end();
 
   // Events.  `envelope` is left in a valid but unknown state.
   void on_message(const std::string& peer, v1::Envelope* envelope, double now);

@@ -27,13 +27,13 @@ std::uint64_t number_of(const v1::StreamKey& stream) {
 
 }  // namespace
 
-TakenAnswer taken_answer(const v1::Task& task, const v1::TaskResult& result, WorkerIdentityPtr by) {
+std::string answer_hash(const v1::TaskResult& result) {
   if (result.outcome() != v1::OK || result.message().empty()) {
-    return {task_label(task), content_hash(result.SerializeAsString()), std::move(by)};
+    return content_hash(result.SerializeAsString());
   }
   v1::TaskResult without_notes = result;  // they may be of the clock
   without_notes.clear_message();
-  return {task_label(task), content_hash(without_notes.SerializeAsString()), std::move(by)};
+  return content_hash(without_notes.SerializeAsString());
 }
 
 bool chosen_for_audit(const v1::Task& task, std::uint64_t job, double share) {
@@ -83,21 +83,24 @@ void SecondOpinions::remember(std::uint64_t attempt, Expected expected) {
   expected_.emplace(attempt, std::move(expected));
 }
 
-bool SecondOpinions::compare(const WorkerIdentityPtr& worker, const v1::JobResult& result,
-                             std::optional<Disagreement>* disagreement) {
+bool SecondOpinions::take_expected(const WorkerIdentityPtr& worker, const v1::JobResult& result,
+                                   std::optional<Disagreement>* disagreement) {
   const auto found = expected_.find(result.attempt_id());
   if (found == expected_.end()) return false;
   const Expected& expected = found->second;
   if (expected.worker != worker->id || expected.job != result.job_id()) return false;
-  const TakenAnswer& first = expected.first;
-  if (first.by->numeric_class == worker->numeric_class) {
-    ++compared_;
-    if (content_hash(result.result().SerializeAsString()) != first.hash) {
-      *disagreement = Disagreement{first.question, first.by, worker};
-    }
-  }
+  *disagreement = compare(expected.first, result.result(), worker);
   expected_.erase(found);
   return true;
+}
+
+std::optional<Disagreement> SecondOpinions::compare(const TakenAnswer& first,
+                                                    const v1::TaskResult& second,
+                                                    const WorkerIdentityPtr& by) {
+  if (first.by->numeric_class != by->numeric_class) return {};
+  ++compared_;
+  if (answer_hash(second) == first.hash) return {};
+  return Disagreement{first.question, first.by, by};
 }
 
 void SecondOpinions::give_back(WorkerId worker, std::uint64_t attempt) {

@@ -27,7 +27,7 @@ struct TakenAnswer {
   WorkerIdentityPtr by;
 };
 
-TakenAnswer taken_answer(const v1::Task& task, const v1::TaskResult& result, WorkerIdentityPtr by);
+std::string answer_hash(const v1::TaskResult& result);
 
 // True for about `share` of all tasks, the same ones every time: by the task's random stream where
 // it has one, else by `job`.
@@ -48,8 +48,11 @@ class SecondOpinions {
   // An answer of `worker` to `attempt` is to be compared with `first`.
   void expect(std::uint64_t attempt, std::uint64_t job, WorkerId worker, TakenAnswer first);
   // True: it was expected, and is not any more.
-  bool compare(const WorkerIdentityPtr& worker, const v1::JobResult& result,
-               std::optional<Disagreement>* disagreement);
+  bool take_expected(const WorkerIdentityPtr& worker, const v1::JobResult& result,
+                     std::optional<Disagreement>* disagreement);
+  // The two may only be held against each other within a numeric class.
+  std::optional<Disagreement> compare(const TakenAnswer& first, const v1::TaskResult& second,
+                                      const WorkerIdentityPtr& by);
   // `worker` will not answer `attempt`; an audit is done by somebody else.
   void give_back(WorkerId worker, std::uint64_t attempt);
 

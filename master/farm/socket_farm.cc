@@ -118,8 +118,19 @@ void SocketFarm::sleep(double now) {
   socket_->wait(fds, std::max(0.0, until - now));
 }
 
-Status SocketFarm::loop(const std::function<void(const FarmProgress&)>& on_progress,
-                        const std::function<Result<bool>()>& on_round) {
+Result<bool> SocketFarm::hand_over(const TakeAnswer& take) {
+  std::vector<v1::Task> more;
+  for (auto& [place, result] : scheduler_->take_answers()) {
+    ASSIGN_OR_RETURN(auto next, take(place, std::move(result)));
+    std::move(next.begin(), next.end(), std::back_inserter(more));
+  }
+  RETURN_IF_ERROR(check(more));
+  const bool some = !more.empty();
+  if (some) scheduler_->append(std::move(more));
+  return some;
+}
+
+Status SocketFarm::loop(const TakeAnswer& take, const OnProgress& on_progress) {
   double next_progress = 0;
   bool busy = false;
   for (;;) {
@@ -127,10 +138,8 @@ Status SocketFarm::loop(const std::function<void(const FarmProgress&)>& on_progr
     const double now = monotonic_seconds();
     if (!busy || now >= next_reap_) reap(now);
     busy = pump(*socket_, *scheduler_, now);
-    if (on_round) {
-      ASSIGN_OR_RETURN(const bool more, on_round());
-      busy |= more;
-    }
+    ASSIGN_OR_RETURN(const bool more, hand_over(take));
+    busy |= more;
     if (scheduler_->finished()) break;
     if (on_progress && now >= next_progress) {
       on_progress(scheduler_->progress());
@@ -183,47 +192,18 @@ Status SocketFarm::check(const std::vector<v1::Task>& tasks) const {
   return {};
 }
 
-Result<std::vector<v1::TaskResult>> SocketFarm::ask(
-    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-    const std::function<void(const FarmProgress&)>& on_progress,
-    const std::function<Result<bool>()>& on_round) {
+Status SocketFarm::stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
+                          const TakeAnswer& take, const OnProgress& on_progress) {
   if (const auto found = unsendable_.find(problem_hash); found != unsendable_.end()) {
     return Error{found->second};
   }
   RETURN_IF_ERROR(check(tasks));
-  scheduler_->start(problem_hash, tasks);
-  const Status status = loop(on_progress, on_round);
+  scheduler_->start(problem_hash, std::move(tasks));
+  Status status = loop(take, on_progress);
   unanswered_ = !status;
-  if (!status) {
-    scheduler_->abandon();
-    pump(*socket_, *scheduler_, monotonic_seconds());
-    return status.error();
-  }
-  return scheduler_->finish();
-}
-
-Result<std::vector<v1::TaskResult>> SocketFarm::run(
-    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-    const std::function<void(const FarmProgress&)>& on_progress) {
-  return ask(problem_hash, tasks, on_progress);
-}
-
-Status SocketFarm::stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
-                          const TakeAnswer& take,
-                          const std::function<void(const FarmProgress&)>& on_progress) {
-  const auto on_round = [&]() -> Result<bool> {
-    std::vector<v1::Task> more;
-    for (const auto& [place, result] : scheduler_->take_answers()) {
-      ASSIGN_OR_RETURN(auto next, take(place, result));
-      std::move(next.begin(), next.end(), std::back_inserter(more));
-    }
-    RETURN_IF_ERROR(check(more));
-    const bool some = !more.empty();
-    if (some) scheduler_->append(std::move(more));
-    return some;
-  };
-  const auto results = ask(problem_hash, tasks, on_progress, on_round);
-  return results ? Status() : Status(results.error());
+  scheduler_->end();
+  if (!status) pump(*socket_, *scheduler_, monotonic_seconds());
+  return status;
 }
 
 FarmTally SocketFarm::tally() const {

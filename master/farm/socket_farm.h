@@ -29,7 +29,7 @@ struct SocketFarmOptions : SchedulerOptions {
   LinkLimits limits;
   std::string worker_program;  // empty: find_worker_program()
   ProcessLimits local_limits;  // of the local workers; others have their own supervisors
-  StopSource* stop = nullptr;  // ends run(); not owned, outlives the farm
+  StopSource* stop = nullptr;  // ends stream(); not owned, outlives the farm
 };
 
 // Error: a problem too large for a message to a worker.
@@ -47,17 +47,9 @@ class SocketFarm : public Farm {
   std::string add_problem(const v1::Problem& problem) override;
   // Also fails when a task or the problem is larger than a message may be, and when every local
   // worker is gone for good and nobody else can come.
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress = {}) override;
-
   Status stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
-                const TakeAnswer& take,
-                const std::function<void(const FarmProgress&)>& on_progress = {}) override;
+                const TakeAnswer& take, const OnProgress& on_progress = {}) override;
 
-  void watch_answers(AnswerWatcher watcher) override {
-    scheduler_->watch_answers(std::move(watcher));
-  }
   std::vector<WorkerStatus> workers() const override { return scheduler_->worker_status(); }
   std::vector<FleetStatus> fleets() const override { return scheduler_->fleet_status(); }
   std::vector<std::string> endpoints() const override { return endpoints_; }
@@ -82,13 +74,9 @@ class SocketFarm : public Farm {
   Status workers_can_be_had();
   void sleep(double now);
   Status check(const std::vector<v1::Task>& tasks) const;
-  // `on_round` (may be empty) is called after messages were taken; true: there are more tasks.
-  Status loop(const std::function<void(const FarmProgress&)>& on_progress,
-              const std::function<Result<bool>()>& on_round);
-  Result<std::vector<v1::TaskResult>> ask(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress,
-      const std::function<Result<bool>()>& on_round = {});
+  Status loop(const TakeAnswer& take, const OnProgress& on_progress);
+  // True: there are more tasks.
+  Result<bool> hand_over(const TakeAnswer& take);
 
   SocketFarmOptions options_;
   // Ends in the reverse order: workers first, then the socket, then the folder it lives in.

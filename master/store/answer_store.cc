@@ -45,12 +45,6 @@ Result<AnswerStore> AnswerStore::open(const std::filesystem::path& file,
   return store;
 }
 
-std::int64_t AnswerStore::reserve(std::size_t count) {
-  const std::int64_t first = next_number_;
-  next_number_ += static_cast<std::int64_t>(count);
-  return first;
-}
-
 Status AnswerStore::add_problem(const std::string& hash, const std::string& bytes) {
   return database_.run("keep a problem", "INSERT OR IGNORE INTO problems VALUES (?, ?)", hash,
                        SqlBlob{bytes});
@@ -79,8 +73,8 @@ Status AnswerStore::add(const std::string& problem_hash, const std::string& stag
                    database_.prepare("INSERT OR IGNORE INTO answers VALUES (?, ?, ?, ?, ?, ?, ?)",
                                      "keep answers"));
   for (const Answer& answer : answers) {
-    const std::string task = answer.task->SerializeAsString();
-    const std::string result = answer.result->SerializeAsString();
+    const std::string task = answer.task.SerializeAsString();
+    const std::string result = answer.result.SerializeAsString();
     insert.bind_all(answer.key, answer.number, problem_hash, fingerprint_, stage, SqlBlob{task},
                     SqlBlob{result});
     RETURN_IF_ERROR(insert.run());
@@ -121,14 +115,17 @@ Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file
                        });
 }
 
-RecordedFarm::RecordedFarm(std::shared_ptr<Farm> farm, AnswerStore* store, Clock clock)
-    : farm_(std::move(farm)), store_(store), clock_(clock) {
-  if (store_ == nullptr) return;
-  farm_->watch_answers(
-      [this](std::size_t task, const v1::TaskResult& result) { on_answer(task, result); });
-}
-
-RecordedFarm::~RecordedFarm() { farm_->watch_answers({}); }
+struct RecordedFarm::Batch {
+  struct Open {
+    std::size_t place = 0;  // for who asks
+    AnswerStore::Answer answer;
+  };
+  const std::string& problem_hash;
+  double flushed_s;
+  std::size_t places = 0;
+  std::vector<Open> open = {};                     // by the place for the farm that answers
+  std::vector<AnswerStore::Answer> answered = {};  // not in the store yet
+};
 
 std::string RecordedFarm::add_problem(const v1::Problem& problem) {
   std::string hash = farm_->add_problem(problem);
@@ -136,93 +133,71 @@ std::string RecordedFarm::add_problem(const v1::Problem& problem) {
   return hash;
 }
 
-Result<RecordedFarm::Open> RecordedFarm::look_up(const std::string& problem_hash,
-                                                 const std::vector<v1::Task>& tasks,
-                                                 std::vector<v1::TaskResult>& results) {
-  Open open;
+Result<std::vector<v1::Task>> RecordedFarm::look_up(Batch& batch, std::vector<v1::Task> tasks,
+                                                    const TakeAnswer& take) {
+  std::vector<v1::Task> open;
+  asked_ += tasks.size();
   for (std::size_t i = 0; i < tasks.size(); ++i) {
-    std::string key;
+    Batch::Open question{batch.places++, {}};
     if (store_ != nullptr) {
-      key = store_->key(problem_hash, tasks[i]);
-      ASSIGN_OR_RETURN(auto found, store_->find(key));
+      question.answer.key = store_->key(batch.problem_hash, tasks[i]);
+      ASSIGN_OR_RETURN(auto found, store_->find(question.answer.key));
       if (found) {
-        results[i] = std::move(*found);
+        ++remembered_;
+        ASSIGN_OR_RETURN(auto more, take(question.place, std::move(*found)));
+        asked_ += more.size();
+        std::move(more.begin(), more.end(), std::back_inserter(tasks));
         continue;
       }
+      question.answer.number = store_->reserve();
+      question.answer.task = tasks[i];
     }
-    open.tasks.push_back(tasks[i]);
-    open.places.push_back(i);
-    open.keys.push_back(std::move(key));
+    batch.open.push_back(std::move(question));
+    open.push_back(std::move(tasks[i]));
   }
-  open.kept.resize(open.tasks.size(), store_ == nullptr);
-  if (store_ != nullptr) open.first_number = store_->reserve(open.tasks.size());
   return open;
 }
 
-void RecordedFarm::on_answer(std::size_t task, const v1::TaskResult& result) {
-  if (task >= open_.tasks.size() || open_.kept[task]) return;
-  waiting_[task] = result;
-  if (clock_() - flushed_s_ < kFlushInterval_s) return;
-  if (Status s = flush(); !s && trouble_) trouble_ = s;
-}
-
-Status RecordedFarm::flush() {
-  std::vector<AnswerStore::Answer> answers;
-  for (const auto& [k, result] : waiting_) {
-    if (open_.kept[k] || result.outcome() == v1::WORKER_FAILED) continue;
-    const auto number = open_.first_number + static_cast<std::int64_t>(k);
-    answers.push_back({open_.keys[k], number, &open_.tasks[k], &result});
-  }
-  flushed_s_ = clock_();
-  if (answers.empty()) return {};
-  RETURN_IF_ERROR(store_->add(problem_hash_, stage_, answers));
-  for (const auto& [k, result] : waiting_) open_.kept[k] = true;
-  waiting_.clear();
+Status RecordedFarm::flush(Batch& batch) {
+  batch.flushed_s = clock_();
+  if (batch.answered.empty()) return {};
+  RETURN_IF_ERROR(store_->add(batch.problem_hash, stage_, batch.answered));
+  batch.answered.clear();
   return {};
 }
 
-void RecordedFarm::report_progress(std::uint64_t done) {
-  if (watcher_) watcher_({remembered_, simulated_ + done, asked_});
-}
-
-Result<std::vector<v1::TaskResult>> RecordedFarm::run(
-    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-    const std::function<void(const FarmProgress&)>& on_progress) {
+Status RecordedFarm::stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
+                            const TakeAnswer& take, const OnProgress& on_progress) {
   if (const auto fresh = unkept_.find(problem_hash); fresh != unkept_.end()) {
     RETURN_IF_ERROR(store_->add_problem(problem_hash, fresh->second));
     unkept_.erase(fresh);
   }
-  std::vector<v1::TaskResult> results(tasks.size());
-  ASSIGN_OR_RETURN(open_, look_up(problem_hash, tasks, results));
-  problem_hash_ = problem_hash;
-  waiting_.clear();
-  trouble_ = {};
-  const std::size_t at_hand = tasks.size() - open_.tasks.size();
-  remembered_ += at_hand;
-  asked_ += tasks.size();
-  flushed_s_ = clock_();
-  report_progress(0);
-  if (open_.tasks.empty()) return results;
-  auto fresh = farm_->run(problem_hash, open_.tasks, [&](const FarmProgress& progress) {
-    report_progress(progress.done);
-    if (on_progress) on_progress({at_hand + progress.done, tasks.size()});
-  });
-  if (!fresh) {
-    // The batch is over for the farm, but what it did answer is here.
-    static_cast<void>(flush());
-    return fresh.error();
-  }
-  for (std::size_t k = 0; k < fresh->size(); ++k) {
-    if (!open_.kept[k]) waiting_[k] = (*fresh)[k];
-  }
-  if (trouble_) trouble_ = flush();
-  if (!trouble_) return trouble_.error();
-  simulated_ += open_.tasks.size();
-  report_progress(0);
-  for (std::size_t k = 0; k < open_.tasks.size(); ++k) {
-    results[open_.places[k]] = std::move((*fresh)[k]);
-  }
-  return results;
+  Batch batch{problem_hash, clock_()};
+  ASSIGN_OR_RETURN(auto open, look_up(batch, std::move(tasks), take));
+  report_progress();
+  if (open.empty()) return {};
+  const auto on_answer = [&](std::size_t k,
+                             v1::TaskResult result) -> Result<std::vector<v1::Task>> {
+    ++simulated_;
+    Batch::Open& question = batch.open[k];
+    if (store_ != nullptr && result.outcome() != v1::WORKER_FAILED) {
+      question.answer.result = result;
+      batch.answered.push_back(std::move(question.answer));
+    }
+    if (clock_() - batch.flushed_s >= kFlushInterval_s) RETURN_IF_ERROR(flush(batch));
+    ASSIGN_OR_RETURN(auto more, take(question.place, std::move(result)));
+    return look_up(batch, std::move(more), take);
+  };
+  Status status =
+      farm_->stream(problem_hash, std::move(open), on_answer, [&](const FarmProgress& progress) {
+        report_progress();
+        const std::size_t at_hand = batch.places - batch.open.size();
+        if (on_progress) on_progress({at_hand + progress.done, at_hand + progress.total});
+      });
+  // After an error, too: what was answered is here.
+  Status kept = flush(batch);
+  report_progress();
+  return status ? kept : status;
 }
 
 }  // namespace gapfarm

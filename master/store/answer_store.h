@@ -34,15 +34,15 @@ class AnswerStore {
   std::string key(const std::string& problem_hash, const v1::Task& task) const;
   Result<std::optional<v1::TaskResult>> find(const std::string& key) const;
 
-  // The first of `count` numbers that no answer has: questions keep the order in which they were
-  // asked, whenever they are answered.
-  std::int64_t reserve(std::size_t count);
+  // A number that no answer has: questions keep the order in which they were asked, whenever they
+  // are answered.
+  std::int64_t reserve() { return next_number_++; }
 
   struct Answer {
     std::string key;
     std::int64_t number = 0;  // of those reserved
-    const v1::Task* task = nullptr;
-    const v1::TaskResult* result = nullptr;
+    v1::Task task;
+    v1::TaskResult result;
   };
   // All of them or none.  `stage` says what they were for.
   Status add(const std::string& problem_hash, const std::string& stage,
@@ -89,9 +89,8 @@ class RecordedFarm : public Farm {
  public:
   // Seconds of a clock that never goes back.
   // The store outlives this.  Null: nothing is remembered, and progress is shown all the same.
-  RecordedFarm(std::shared_ptr<Farm> farm, AnswerStore* store, Clock clock = monotonic_seconds);
-  ~RecordedFarm() override;
-  RecordedFarm& operator=(RecordedFarm&&) = delete;
+  RecordedFarm(std::shared_ptr<Farm> farm, AnswerStore* store, Clock clock = monotonic_seconds)
+      : farm_(std::move(farm)), store_(store), clock_(clock) {}
 
   // Written beside the answers from now on.
   void set_stage(std::string stage) { stage_ = std::move(stage); }
@@ -104,9 +103,8 @@ class RecordedFarm : public Farm {
   // Errors: the farm's and the store's.  Answers are kept as they come, so that
   // neither an error nor the end of this process loses more than about a second's; those that say
   // more of the workers than of the question (WORKER_FAILED) are not kept.
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress = {}) override;
+  Status stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
+                const TakeAnswer& take, const OnProgress& on_progress = {}) override;
   std::vector<WorkerStatus> workers() const override { return farm_->workers(); }
   std::vector<FleetStatus> fleets() const override { return farm_->fleets(); }
   std::vector<std::string> endpoints() const override { return farm_->endpoints(); }
@@ -116,19 +114,14 @@ class RecordedFarm : public Farm {
   std::uint64_t simulated() const { return simulated_; }
 
  private:
-  // The tasks of a batch that the store has no answer to.
-  struct Open {
-    std::vector<v1::Task> tasks;
-    std::vector<std::size_t> places;  // in the batch
-    std::vector<std::string> keys;
-    std::vector<bool> kept;
-    std::int64_t first_number = 0;
-  };
-  Result<Open> look_up(const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-                       std::vector<v1::TaskResult>& results);
-  void on_answer(std::size_t task, const v1::TaskResult& result);
-  Status flush();
-  void report_progress(std::uint64_t done);
+  struct Batch;
+  // Of these tasks, and those that remembered answers lead to, the ones to be simulated.
+  Result<std::vector<v1::Task>> look_up(Batch& batch, std::vector<v1::Task> tasks,
+                                        const TakeAnswer& take);
+  Status flush(Batch& batch);
+  void report_progress() const {
+    if (watcher_) watcher_({remembered_, simulated_, asked_});
+  }
 
   std::shared_ptr<Farm> farm_;
   AnswerStore* store_;
@@ -139,12 +132,6 @@ class RecordedFarm : public Farm {
   std::uint64_t remembered_ = 0;
   std::uint64_t simulated_ = 0;
   std::uint64_t asked_ = 0;
-  // Of the batch in work.
-  std::string problem_hash_;
-  Open open_;
-  std::map<std::size_t, v1::TaskResult> waiting_;  // answered, not in the store yet
-  double flushed_s_ = 0;
-  Status trouble_;  // of the store
 };
 
 }  // namespace gapfarm

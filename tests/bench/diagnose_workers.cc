@@ -15,6 +15,7 @@
 #include "common/problem/problem.h"
 #include "common/trials/read.h"
 #include "master/diagnose/diagnose.h"
+#include "tests/immediate_farm.h"
 #include "worker/evaluate.h"
 
 namespace gapfarm {
@@ -26,7 +27,7 @@ double seconds(clockid_t clock) {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-class TimedFarm : public Farm {
+class TimedFarm : public tests::ImmediateFarm {
  public:
   std::string add_problem(const v1::Problem& problem) override {
     const std::string hash = problem_hash(problem);
@@ -35,23 +36,23 @@ class TimedFarm : public Farm {
     return hash;
   }
 
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& /*on_progress*/) override {
-    std::vector<v1::TaskResult> results;
-    std::vector<double>& batch = batches_.emplace_back();
-    for (const v1::Task& task : tasks) {
-      const double began = seconds(CLOCK_THREAD_CPUTIME_ID);
-      results.push_back(evaluate(problems_.at(hash).get(), task));
-      batch.push_back(seconds(CLOCK_THREAD_CPUTIME_ID) - began);
-    }
-    return results;
+  Status stream(const std::string& hash, std::vector<v1::Task> tasks, const TakeAnswer& take,
+                const OnProgress& on_progress) override {
+    batches_.emplace_back();
+    return ImmediateFarm::stream(hash, std::move(tasks), take, on_progress);
   }
 
   // CPU time of each task, batch by batch.
   const std::vector<std::vector<double>>& batches() const { return batches_; }
 
  private:
+  Result<v1::TaskResult> answer_task(const std::string& hash, const v1::Task& task) override {
+    const double began = seconds(CLOCK_THREAD_CPUTIME_ID);
+    v1::TaskResult result = evaluate(problems_.at(hash).get(), task);
+    batches_.back().push_back(seconds(CLOCK_THREAD_CPUTIME_ID) - began);
+    return result;
+  }
+
   std::map<std::string, std::unique_ptr<PreparedProblem>> problems_;
   std::vector<std::vector<double>> batches_;
 };

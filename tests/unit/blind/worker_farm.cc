@@ -14,15 +14,9 @@ std::string WorkerFarm::add_problem(const v1::Problem& problem) {
   return hash;
 }
 
-Result<std::vector<v1::TaskResult>> WorkerFarm::run(
-    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-    const std::function<void(const FarmProgress&)>& on_progress) {
-  std::vector<v1::TaskResult> results;
-  for (const v1::Task& task : tasks) {
-    results.push_back(evaluate(problems_.at(problem_hash).get(), task));
-    if (on_progress) on_progress({results.size(), tasks.size()});
-  }
-  return results;
+Result<v1::TaskResult> WorkerFarm::answer_task(const std::string& problem_hash,
+                                               const v1::Task& task) {
+  return evaluate(problems_.at(problem_hash).get(), task);
 }
 
 Config small_config() {

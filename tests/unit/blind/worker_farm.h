@@ -6,18 +6,19 @@
 #include <string>
 
 #include "common/config/settings.h"
-#include "master/farm/farm.h"
+#include "tests/immediate_farm.h"
 #include "tests/temporary_folder.h"
 #include "worker/evaluate.h"
 
 namespace gapfarm::tests {
 
-class WorkerFarm : public Farm {
+class WorkerFarm : public ImmediateFarm {
  public:
   std::string add_problem(const v1::Problem& problem) override;
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress = {}) override;
+
+ protected:
+  Result<v1::TaskResult> answer_task(const std::string& problem_hash,
+                                     const v1::Task& task) override;
 
  private:
   std::map<std::string, std::unique_ptr<PreparedProblem>> problems_;

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "common/problem/problem.h"
-#include "master/farm/farm.h"
+#include "tests/immediate_farm.h"
 
 namespace gapfarm {
 
-class AnsweringFarm : public Farm {
+class AnsweringFarm : public tests::ImmediateFarm {
  public:
   std::string add_problem(const v1::Problem& problem) override {
     const std::string hash = problem_hash(problem);
@@ -19,19 +19,14 @@ class AnsweringFarm : public Farm {
     return hash;
   }
 
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& = {}) override {
-    std::vector<v1::TaskResult> results;
-    for (const v1::Task& task : tasks) results.push_back(answer(problems_.at(hash), task));
-    asked += tasks.size();
-    return results;
-  }
-
   std::size_t asked = 0;
 
  private:
   virtual v1::TaskResult answer(const Problem& problem, const v1::Task& task) const = 0;
+  Result<v1::TaskResult> answer_task(const std::string& hash, const v1::Task& task) final {
+    ++asked;
+    return answer(problems_.at(hash), task);
+  }
 
   std::map<std::string, Problem> problems_;
 };

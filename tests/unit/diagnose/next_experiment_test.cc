@@ -6,6 +6,7 @@
 
 #include "common/random/stream.h"
 #include "master/diagnose/subject.h"
+#include "tests/immediate_farm.h"
 
 namespace gapfarm::next_experiment_test {
 namespace {
@@ -19,7 +20,7 @@ struct Seen {
 };
 
 // Predicts every trial's end at its start, moved in x (own axes) as `shift` says.
-class FakeFarm : public Farm {
+class FakeFarm : public tests::ImmediateFarm {
  public:
   explicit FakeFarm(std::function<double(const Seen&)> shift) : shift_(std::move(shift)) {}
 
@@ -27,20 +28,14 @@ class FakeFarm : public Farm {
     problem_ = problem;
     return "hash";
   }
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string&, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>&) override {
-    if (broken) return stop_requested();
-    std::vector<v1::TaskResult> results;
-    for (const v1::Task& task : tasks) results.push_back(answer(task.predict()));
-    return results;
-  }
 
   bool broken = false;
   double diverges_above = 1e9;
 
  private:
-  v1::TaskResult answer(const v1::PredictTask& task) {
+  Result<v1::TaskResult> answer_task(const std::string&, const v1::Task& asked) override {
+    if (broken) return stop_requested();
+    const v1::PredictTask& task = asked.predict();
     EXPECT_GT(task.trials_size(), 0);
     v1::TaskResult result;
     const double strength =

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/net/envelope.h"
@@ -14,9 +16,7 @@ namespace gapfarm::scheduler_test {
 
 std::vector<v1::Task> echo_tasks(std::size_t count) {
   std::vector<v1::Task> tasks(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    tasks[i].mutable_echo()->set_payload(std::to_string(i));
-  }
+  for (std::size_t i = 0; i < count; ++i) tasks[i].mutable_echo()->set_payload(std::to_string(i));
   return tasks;
 }
 
@@ -78,9 +78,7 @@ class Desk {
   // What goes out now, jobs apart.
   std::vector<Outgoing> tick() {
     scheduler.on_tick(now);
-    std::vector<Outgoing> out;
-    out.swap(scheduler.outbox());
-    return out;
+    return std::exchange(scheduler.outbox(), {});
   }
   std::vector<v1::Job> jobs_for(const std::string& peer) {
     std::vector<v1::Job> jobs;
@@ -91,10 +89,15 @@ class Desk {
     return jobs;
   }
   bool reported(FarmEvent::Kind kind) const {
-    for (const FarmEvent& event : events) {
-      if (event.kind == kind) return true;
-    }
-    return false;
+    return std::ranges::count(events, kind, &FarmEvent::kind) > 0;
+  }
+
+  // Of the batch, which ends.
+  std::vector<v1::TaskResult> results() {
+    std::vector<v1::TaskResult> results(scheduler.progress().total);
+    for (auto& [place, result] : scheduler.take_answers()) results[place] = std::move(result);
+    scheduler.end();
+    return results;
   }
 
   double now = 0;
@@ -116,7 +119,7 @@ TEST(Scheduler, KeepsAWindowFullAndAnswersInTheTasksOrder) {
     for (const v1::Job& job : desk.jobs_for("a")) jobs.push_back(job);
   }
   ASSERT_TRUE(desk.scheduler.finished());
-  const auto results = desk.scheduler.finish();
+  const auto results = desk.results();
   for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(results[i].echo(), std::to_string(i));
 }
 
@@ -219,7 +222,7 @@ TEST(Scheduler, TakesNoAnswerTwiceNorFromAnotherEpochOrWorker) {
   desk.answer(owner, job, 7, v1::INVALID_REQUEST);
   desk.answer(owner, job);
   EXPECT_EQ(desk.scheduler.tally().late, 1u);
-  EXPECT_EQ(desk.scheduler.finish()[0].outcome(), v1::INVALID_REQUEST);
+  EXPECT_EQ(desk.results()[0].outcome(), v1::INVALID_REQUEST);
   desk.scheduler.start("", echo_tasks(1));
   desk.answer(owner, job);
   EXPECT_FALSE(desk.scheduler.finished()) << "an answer of the batch before";
@@ -270,7 +273,7 @@ TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
   ASSERT_TRUE(desk.scheduler.finished());
   EXPECT_TRUE(desk.reported(FarmEvent::kQuarantined));
   EXPECT_EQ(desk.scheduler.given_up(), 1u);
-  const auto results = desk.scheduler.finish();
+  const auto results = desk.results();
   EXPECT_EQ(results[0].outcome(), v1::OK);
   EXPECT_EQ(results[1].outcome(), v1::WORKER_FAILED);
   EXPECT_EQ(results[2].outcome(), v1::OK);
@@ -348,7 +351,7 @@ TEST(Scheduler, ShufflingChangesTheOrderOutButNotTheResults) {
   ASSERT_EQ(jobs.size(), 50u);
   EXPECT_NE(jobs[0].task().echo().payload() + jobs[1].task().echo().payload(), "01");
   for (const v1::Job& job : jobs) desk.answer("a", job);
-  const auto results = desk.scheduler.finish();
+  const auto results = desk.results();
   for (std::size_t i = 0; i < 50; ++i) EXPECT_EQ(results[i].echo(), std::to_string(i));
 }
 

@@ -318,8 +318,8 @@ bool SimulatedFarm::stream(std::vector<v1::Task> tasks, const Farm::TakeAnswer& 
   while (!scheduler_->finished()) {
     if (now_ > limit || !step()) return false;
     std::vector<v1::Task> more;
-    for (const auto& [place, result] : scheduler_->take_answers()) {
-      auto next = take(place, result);
+    for (auto& [place, result] : scheduler_->take_answers()) {
+      auto next = take(place, std::move(result));
       if (!next) return false;
       std::move(next->begin(), next->end(), std::back_inserter(more));
     }
@@ -327,7 +327,7 @@ bool SimulatedFarm::stream(std::vector<v1::Task> tasks, const Farm::TakeAnswer& 
     scheduler_->append(std::move(more));
     step_master();
   }
-  scheduler_->finish();
+  scheduler_->end();
   return true;
 }
 
@@ -346,7 +346,11 @@ std::vector<v1::TaskResult> SimulatedFarm::run(const std::vector<v1::Task>& task
     while (!scheduler_->finished() || (last && now_ < faults_.span_s)) {
       if (now_ > limit || !step()) return {};
     }
-    for (v1::TaskResult& result : scheduler_->finish()) all.push_back(std::move(result));
+    const std::size_t before = all.size();
+    all.resize(before + batch_.size());
+    for (auto& [place, result] : scheduler_->take_answers())
+      all[before + place] = std::move(result);
+    scheduler_->end();
   }
   return all;
 }

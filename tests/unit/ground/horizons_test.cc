@@ -56,20 +56,18 @@ TEST(Horizons, ReportEveryWindowBesideTheMedians) {
 class FallsOver : public tests::WorkerFarm {
  public:
   explicit FallsOver(std::uint32_t trial) : trial_(trial) {}
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& hash, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& progress) override {
-    auto results = tests::WorkerFarm::run(hash, tasks, progress);
-    for (std::size_t i = 0; i < tasks.size(); ++i) {
-      const auto& trials = tasks[i].predict().trials();
-      if (std::count(trials.begin(), trials.end(), trial_) == 0) continue;
-      (*results)[i].Clear();
-      (*results)[i].set_outcome(v1::DIVERGED);
-    }
-    return results;
-  }
 
  private:
+  Result<v1::TaskResult> answer_task(const std::string& hash, const v1::Task& task) override {
+    const auto& trials = task.predict().trials();
+    if (std::count(trials.begin(), trials.end(), trial_) == 0) {
+      return tests::WorkerFarm::answer_task(hash, task);
+    }
+    v1::TaskResult result;
+    result.set_outcome(v1::DIVERGED);
+    return result;
+  }
+
   std::uint32_t trial_;
 };
 

@@ -32,17 +32,19 @@ class ShakyFarm : public tests::WorkerFarm {
 
   ShakyFarm(const Faults& faults, std::size_t* batches) : faults_(faults), batches_(batches) {}
 
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string& problem, const std::vector<v1::Task>& tasks,
-      const std::function<void(const FarmProgress&)>& on_progress) override {
+  Status stream(const std::string& problem, std::vector<v1::Task> tasks, const TakeAnswer& take,
+                const OnProgress& on_progress) override {
     if (++*batches_ == faults_.no_worker_at) return Error{"no worker can be had"};
-    auto results = WorkerFarm::run(problem, tasks, on_progress);
-    if (results && *batches_ == faults_.gives_up_at) {
-      results->front().Clear();
-      results->front().set_outcome(v1::WORKER_FAILED);
-      ++given_up_;
-    }
-    return results;
+    const bool gives_up = *batches_ == faults_.gives_up_at;
+    const auto shaken = [&](std::size_t place, v1::TaskResult result) {
+      if (gives_up && place == 0) {
+        result.Clear();
+        result.set_outcome(v1::WORKER_FAILED);
+        ++given_up_;
+      }
+      return take(place, std::move(result));
+    };
+    return WorkerFarm::stream(problem, std::move(tasks), shaken, on_progress);
   }
 
   std::uint64_t given_up() const override { return given_up_; }

@@ -105,7 +105,7 @@ TEST_F(CommandRecordTest, ForgettingTakesAnswersOutOfTheFileAndLeavesTheRecord) 
   task.mutable_echo()->set_payload("a telling word");
   v1::TaskResult result;
   ASSERT_TRUE(store->add_problem("hash", "problem").ok());
-  ASSERT_TRUE(store->add("hash", "stage", {{store->key("hash", task), 1, &task, &result}}).ok());
+  ASSERT_TRUE(store->add("hash", "stage", {{store->key("hash", task), 1, task, result}}).ok());
   ASSERT_TRUE(store->set_command(to_json(example()).dump()).ok());
   ASSERT_TRUE(store->forget().ok());
   EXPECT_EQ(*store->count(), 0);
@@ -119,10 +119,9 @@ TEST_F(CommandRecordTest, ForgettingTakesAnswersOutOfTheFileAndLeavesTheRecord) 
 class EmptiedFarm : public Farm {
  public:
   std::string add_problem(const v1::Problem&) override { return {}; }
-  Result<std::vector<v1::TaskResult>> run(
-      const std::string&, const std::vector<v1::Task>&,
-      const std::function<void(const FarmProgress&)>&) override {
-    return std::vector<v1::TaskResult>();
+  Status stream(const std::string&, std::vector<v1::Task>, const TakeAnswer&,
+                const OnProgress&) override {
+    return {};
   }
   std::vector<WorkerStatus> workers() const override {
     return {{"local-1", "here", "gone", 0, 4, 0.0}};
