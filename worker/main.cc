@@ -42,7 +42,7 @@ struct Arguments : ServiceOptions {
   double lifetime_s = 0;
   ProcessLimits limits;
   bool allow_external = false;
-  int parent = 0;
+  bool process = false;  // one of a supervisor's
 };
 
 void describe(CLI::App& app, Arguments* arguments) {
@@ -92,7 +92,7 @@ void describe(CLI::App& app, Arguments* arguments) {
   // For the processes that start this one; no user needs them.
   app.add_flag("--local", arguments->local)->group("");
   app.add_flag("--announce", arguments->announce)->group("");
-  app.add_option("--parent", arguments->parent)->group("");
+  app.add_flag("--process", arguments->process)->group("");
   app.add_option("--replaces", arguments->session.replaces)->group("");
   app.add_option("--replaced-end", arguments->session.replaced_end)
       ->check(CLI::Range(0, int{v1::ProcessEnd_MAX}))
@@ -119,7 +119,6 @@ Result<LinkSecurity> link_security(const Arguments& arguments) {
 
 // One worker, child of a master or a supervisor.
 int work(const Arguments& arguments) {
-  if (!die_with_parent(arguments.parent)) return 0;
   Result<LinkSecurity> security = link_security(arguments);
   if (!security) return complain(security.error(), kExitRefused);
   StopSource stop;
@@ -140,9 +139,8 @@ int work(const Arguments& arguments) {
   // A master on this machine runs what its user may run anyway.
   allow_external_programs(arguments.local || arguments.allow_external);
   EvaluationThread evaluation(options.progress);
-  const Result<ServiceEnd> end = serve(options, evaluation, stop);
-  int status = end ? 0 : complain(end.error(), kExitRefused);
-  if (end && *end == ServiceEnd::kNoMaster) status = kExitNoMaster;
+  const Result<int> end = serve(options, evaluation, stop);
+  const int status = end ? *end : complain(end.error(), kExitRefused);
   // The thread's destructor would wait for a job whose answer nobody wants.
   if (!evaluation.idle()) _exit(status);
   return status;
@@ -199,5 +197,6 @@ int main(int argc, char** argv) {
                  gapfarm::usage_sentence(app, error).c_str());
     return gapfarm::kExitUsage;
   }
-  return arguments.parent > 0 ? gapfarm::work(arguments) : gapfarm::start_workers(arguments);
+  const bool one = arguments.local || arguments.process;
+  return one ? gapfarm::work(arguments) : gapfarm::start_workers(arguments);
 }

@@ -34,7 +34,7 @@ class Service {
         stop_(stop),
         wait_(options.endpoint, options.wait_limit_s) {}
 
-  Result<ServiceEnd> run() {
+  Result<int> run() {
     for (;;) {
       if (options_.progress != nullptr) ++options_.progress->beats;
       const double now = monotonic_seconds();
@@ -46,18 +46,17 @@ class Service {
       pump_out(socket_, session_);
       if (session_.state() == WorkerSession::State::kRefused) return Error{session_.reason()};
       if (session_.state() == WorkerSession::State::kDismissed) {
-        if (options_.local) return ServiceEnd::kDismissed;
+        if (options_.local) return 0;
         session_.restart(now);
       }
-      if (stops_ >= 2) return leave(ServiceEnd::kStoppedNow, "asked to stop at once");
+      if (stops_ >= 2) return leave("asked to stop at once");
       if (now >= options_.session.deadline_s) {
-        return leave(ServiceEnd::kStoppedNow, "its lifetime is over");
+        return leave("its lifetime is over");
       }
       // A core that a cluster lends is given back when nobody needs it.
       if (wait_.is_over(now) && evaluation_.idle()) return stop_waiting();
       if (may_leave()) {
-        return stops_ > 0 ? leave(ServiceEnd::kStopped, "asked to stop")
-                          : leave(ServiceEnd::kOutOfTime, "no lifetime left for another job");
+        return leave(stops_ > 0 ? "asked to stop" : "no lifetime left for another job");
       }
       if (!received) sleep(now);
     }
@@ -89,10 +88,10 @@ class Service {
     if (options_.announce) std::fprintf(stderr, "gapfarm-worker: %s\n", text.c_str());
   }
 
-  ServiceEnd stop_waiting() {
+  int stop_waiting() {
     print(session_.over() ? "the master's work is done" : wait_.over());
-    return leave(session_.over() ? ServiceEnd::kOver : ServiceEnd::kNoMaster,
-                 "no master for too long");
+    leave("no master for too long");
+    return session_.over() ? 0 : kExitNoMaster;
   }
 
   // Between the session and the evaluating thread.
@@ -118,10 +117,10 @@ class Service {
            session_.state() != WorkerSession::State::kWorking || session_.in_hand() == 0;
   }
 
-  ServiceEnd leave(ServiceEnd end, const char* reason) {
+  int leave(const char* reason) {
     v1::Envelope goodbye = session_.goodbye(reason);
     socket_.send("", encode(&goodbye));
-    return end;
+    return 0;
   }
 
   void sleep(double now) {
@@ -217,8 +216,7 @@ std::string unique_worker_name(const std::string& prefix) {
   return (prefix.empty() ? host_name() : prefix) + "-" + std::to_string(getpid()) + "-" + tail;
 }
 
-Result<ServiceEnd> serve(const ServiceOptions& options, EvaluationThread& evaluation,
-                         StopSource& stop) {
+Result<int> serve(const ServiceOptions& options, EvaluationThread& evaluation, StopSource& stop) {
   SocketOptions settings;
   settings.security = options.security;
   ASSIGN_OR_RETURN(auto socket, DealerSocket::connect(options.endpoint, settings));

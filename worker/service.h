@@ -71,31 +71,23 @@ struct ServiceOptions {
   WorkerProgress* progress = nullptr;  // shows that this thread answers; may be null
 };
 
-enum class ServiceEnd {
-  kNoMaster,    // for too long, though the last one may come back, or there never was one
-  kOver,        // the last master's work is done, and no other has come since
-  kStopped,     // by request, with the job in hand finished and its result sent
-  kStoppedNow,  // by a second request, or at the deadline with a job still in work
-  kOutOfTime,   // the session's deadline is near, and nothing is in work
-  kDismissed,   // by the master; local workers only
-};
-
 // A name for this process that no other has: PREFIX (or the host) + pid + random tail.
 std::string unique_worker_name(const std::string& prefix);
 
-// Works until stopped: one stop request finishes the job in work (or all in hand, with
-// `drain`) and sends its result, a second leaves at once.  The others go to other workers.
-// Errors: a bad endpoint; refused by the master, with its reason.  `evaluation` may still have work
-// in hand afterwards (its destructor would wait for that), but nobody wants it.
-Result<ServiceEnd> serve(const ServiceOptions& options, EvaluationThread& evaluation,
-                         StopSource& stop);
+// Works until stopped, dismissed or out of time: one stop request finishes the job in work (or all
+// in hand, with `drain`) and sends its result, a second leaves at once.  The others go to other
+// workers.  An exit status: kExitNoMaster when there has been none for too long, though the last
+// one may come back, or there never was one; else 0.  Errors: a bad endpoint; refused by the
+// master, with its reason.  `evaluation` may still have work in hand afterwards (its destructor
+// would wait for that), but nobody wants it.
+Result<int> serve(const ServiceOptions& options, EvaluationThread& evaluation, StopSource& stop);
 
 // Keeps worker processes alive on a machine that no master runs on.
 
 struct SupervisorOptions {
   std::string program;                 // this executable
   std::string name;                    // prefix of the workers' names, unique on the farm
-  std::vector<std::string> arguments;  // for every worker, beside --name and --parent
+  std::vector<std::string> arguments;  // for every worker, beside --name and --process
   unsigned processes = 1;
   ProcessLimits limits;
   bool leaves_for_good = false;  // a worker that leaves unasked is not replaced: nor would it work

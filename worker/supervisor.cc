@@ -1,6 +1,5 @@
 #include <poll.h>
 #include <signal.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -30,10 +29,10 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
   // It would not find the time for a job, or a master, as the one before did not.
   pool.replaces_leavers = !options.leaves_for_good && !std::isfinite(options.deadline_s);
   pool.arguments = [arguments = options.arguments, prefix = options.name,
-                    parent = std::to_string(getpid()), deadline = options.deadline_s](
-                       const std::string& name, const ProcessEnded* replaced) {
+                    deadline = options.deadline_s](const std::string& name,
+                                                   const ProcessEnded* replaced) {
     std::vector<std::string> all = arguments;
-    all.insert(all.end(), {"--name", name, "--parent", parent});
+    all.insert(all.end(), {"--name", name, "--process"});
     // One speaks for all: the first place's.
     if (name.rfind(prefix + "-1.", 0) == 0) all.push_back("--announce");
     if (replaced != nullptr) {

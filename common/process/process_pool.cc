@@ -5,7 +5,6 @@
 #include <signal.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -52,12 +51,6 @@ Error trouble(const char* what) {
 
 }  // namespace
 
-bool die_with_parent(pid_t pid) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  // The parent may have died before the line above: then this is somebody else's child by now.
-  return getppid() == pid;
-}
-
 std::string executable_path() {
   char path[4096];
   const ssize_t size = readlink("/proc/self/exe", path, sizeof path);
@@ -97,7 +90,6 @@ Status ProcessPool::start_place(Place& place, unsigned index) {
   setup.arguments.insert(setup.arguments.begin(), options_.program);
   setup.kept = page->fd();
   setup.blocks_interrupt = true;
-  setup.death_signal = 0;  // die_with_parent() in the child
   const Result<pid_t> pid = start_child(setup);
   if (!pid) {
     place.gave_up = true;

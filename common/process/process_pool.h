@@ -117,9 +117,9 @@ struct ProcessPoolOptions {
   ProcessLimits limits;
 };
 
-// Children die with the thread that starts them (they get its pid and ask the kernel for it,
-// see die_with_parent), so start and reap from a thread that lives as long as the pool.
-// Times are seconds of one monotonic clock that the caller reads.
+// Children die with the thread that starts them (ChildSetup::death_signal), so start and reap from
+// a thread that lives as long as the pool. Times are seconds of one monotonic clock that the caller
+// reads.
 class ProcessPool {
  public:
   explicit ProcessPool(ProcessPoolOptions options);
@@ -182,9 +182,6 @@ class ProcessPool {
   bool retired_ = false;
   double last_look_ = 0;
 };
-
-// In a child: die when the parent dies.  False when the parent `pid` is gone already.
-bool die_with_parent(pid_t pid);
 
 // Of the running executable; empty when /proc is missing.
 std::string executable_path();

@@ -20,22 +20,6 @@ namespace {
 constexpr double kGoodbyeGrace = 0.5;
 constexpr double kTerminateGrace = 0.5;
 
-ProcessPoolOptions pool_options(std::string program, unsigned count, std::string endpoint,
-                                ProcessLimits limits) {
-  ProcessPoolOptions options;
-  options.program = std::move(program);
-  options.count = count;
-  options.limits = limits;
-  options.name_prefix = "local-" + std::to_string(getpid());
-  const std::string parent = std::to_string(getpid());
-  options.arguments = [endpoint = std::move(endpoint), parent](const std::string& name,
-                                                               const ProcessEnded*) {
-    return std::vector<std::string>{"--connect", endpoint,   "--name", name,
-                                    "--local",   "--parent", parent};
-  };
-  return options;
-}
-
 constexpr const char* kSocket = "/farm";
 constexpr const char* kFolder = "/gapfarm-XXXXXX";
 // Between a socket's bind() and its listen() it looks like one that nobody has.
@@ -104,14 +88,24 @@ PrivateFolder::~PrivateFolder() {
   rmdir(path_.c_str());
 }
 
-LocalWorkers::LocalWorkers(std::string program, unsigned count, std::string endpoint,
-                           ProcessLimits limits)
-    : pool_(pool_options(std::move(program), count, std::move(endpoint), limits)) {}
+ProcessPoolOptions local_worker_pool(std::string program, unsigned count, std::string endpoint,
+                                     ProcessLimits limits) {
+  ProcessPoolOptions options;
+  options.program = std::move(program);
+  options.count = count;
+  options.limits = limits;
+  options.name_prefix = "local-" + std::to_string(getpid());
+  options.arguments = [endpoint = std::move(endpoint)](const std::string& name,
+                                                       const ProcessEnded*) {
+    return std::vector<std::string>{"--connect", endpoint, "--name", name, "--local"};
+  };
+  return options;
+}
 
-LocalWorkers::~LocalWorkers() {
-  if (pool_.wait_all(kGoodbyeGrace)) return;
-  pool_.signal_all(SIGTERM);
-  pool_.wait_all(kTerminateGrace);  // the pool kills the rest
+void end_local_workers(ProcessPool& pool) {
+  if (pool.wait_all(kGoodbyeGrace)) return;
+  pool.signal_all(SIGTERM);
+  pool.wait_all(kTerminateGrace);
 }
 
 }  // namespace gapfarm

@@ -4,7 +4,6 @@
 #include <memory>
 #include <string>
 
-#include "common/base/clock.h"
 #include "common/base/result.h"
 #include "common/process/process_pool.h"
 
@@ -28,20 +27,12 @@ class PrivateFolder {
   std::string path_;
 };
 
-// Started by the constructor's caller through start(); one that ends is started again, unless it
-// ended three times in a row before it sent hello.
-class LocalWorkers {
- public:
-  LocalWorkers(std::string program, unsigned count, std::string endpoint, ProcessLimits limits);
-  // Asks them to go (SIGTERM), then makes them (SIGKILL): they keep nothing that could be lost.
-  ~LocalWorkers();
-  LocalWorkers& operator=(LocalWorkers&&) = delete;
-
-  Status start() { return pool_.start(monotonic_seconds()); }
-  ProcessPool& pool() { return pool_; }
-
- private:
-  ProcessPool pool_;
-};
+// A pool of workers for the master at `endpoint`, to be started; one that ends is started again,
+// unless it ended three times in a row before it sent hello.
+ProcessPoolOptions local_worker_pool(std::string program, unsigned count, std::string endpoint,
+                                     ProcessLimits limits);
+// Waits until they have gone with their master, asks them to (SIGTERM), and leaves the pool to make
+// them (SIGKILL): they keep nothing that could be lost.
+void end_local_workers(ProcessPool& pool);
 
 }  // namespace gapfarm

@@ -50,7 +50,7 @@ Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options
 }
 
 void SocketFarm::on_event(const FarmEvent& event) {
-  if (event.kind == FarmEvent::kJoined && locals_) locals_->pool().confirm(event.worker);
+  if (event.kind == FarmEvent::kJoined && locals_) locals_->confirm(event.worker);
   if (event.kind == FarmEvent::kRefused) last_trouble_ = event.text;
   (options_.on_event ? options_.on_event : complain)(event);
 }
@@ -82,9 +82,9 @@ Status SocketFarm::open_local() {
                                      : Result<std::string>(options_.worker_program));
   ASSIGN_OR_RETURN(folder_, PrivateFolder::make());
   ASSIGN_OR_RETURN(auto endpoint, socket_->bind("ipc://" + folder_->socket_path()));
-  locals_ = std::make_unique<LocalWorkers>(program, options_.local_workers, endpoint,
-                                           options_.local_limits);
-  return locals_->start();
+  locals_ = std::make_unique<ProcessPool>(
+      local_worker_pool(program, options_.local_workers, endpoint, options_.local_limits));
+  return locals_->start(monotonic_seconds());
 }
 
 void SocketFarm::reap(double now) {
@@ -93,7 +93,7 @@ void SocketFarm::reap(double now) {
     on_event({FarmEvent::kRefused, "", std::move(text), ""});
   }
   if (!locals_) return;
-  for (const ProcessEnded& end : locals_->pool().reap(now)) {
+  for (const ProcessEnded& end : locals_->reap(now)) {
     scheduler_->on_process_end(end);
     if (end.gave_up) {
       if (last_trouble_.empty()) last_trouble_ = end.text;
@@ -103,17 +103,17 @@ void SocketFarm::reap(double now) {
 }
 
 Status SocketFarm::workers_can_be_had() {
-  if (!options_.listen.empty() || !locals_ || !locals_->pool().exhausted()) return {};
+  if (!options_.listen.empty() || !locals_ || !locals_->exhausted()) return {};
   return Error{"no worker can be had: " + last_trouble_};
 }
 
 void SocketFarm::sleep(double now) {
   std::vector<int> fds;
-  if (locals_) fds = locals_->pool().fds();
+  if (locals_) fds = locals_->fds();
   if (options_.stop != nullptr) fds.push_back(options_.stop->fd());
   double until = now + std::min(options_.heartbeat_interval_s, kProgressInterval);
   if (locals_) {
-    until = std::min({until, locals_->pool().next_start(), now + locals_->pool().look_interval()});
+    until = std::min({until, locals_->next_start(), now + locals_->look_interval()});
   }
   socket_->wait(fds, std::max(0.0, until - now));
 }
@@ -164,6 +164,7 @@ SocketFarm::~SocketFarm() {
     pump(*socket_, *scheduler_, now);
     if (scheduler_->goodbye_is_answered()) break;
   }
+  if (locals_) end_local_workers(*locals_);
 }
 
 Status check_sendable(const v1::Problem& problem) {
@@ -217,7 +218,7 @@ FarmTally SocketFarm::tally() const {
 }
 
 std::vector<int> SocketFarm::local_pids() const {
-  return locals_ ? locals_->pool().pids() : std::vector<int>{};
+  return locals_ ? locals_->pids() : std::vector<int>{};
 }
 
 namespace {

@@ -17,7 +17,6 @@
 
 namespace gapfarm {
 
-class LocalWorkers;
 class PrivateFolder;
 
 // Of the scheduler's the epoch counts lives of the master so far, below 2^24; the build's
@@ -82,7 +81,7 @@ class SocketFarm : public Farm {
   // Ends in the reverse order: workers first, then the socket, then the folder it lives in.
   std::unique_ptr<PrivateFolder> folder_;
   std::unique_ptr<RouterSocket> socket_;
-  std::unique_ptr<LocalWorkers> locals_;
+  std::unique_ptr<ProcessPool> locals_;
   std::unique_ptr<Scheduler> scheduler_;
   std::vector<std::string> endpoints_;
   std::string last_trouble_;                       // why workers do not come
