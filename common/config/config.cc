@@ -14,6 +14,16 @@
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
+
+Result<toml::table> parse_wanted(std::string_view text, const std::string& path,
+                                 const char* wanted) {
+  auto parsed = parse_toml(text, path);
+  if (parsed) return parsed;
+  const TextFormat format = sniff_format(text);
+  const bool recognised = format != TextFormat::kToml && format != TextFormat::kUnknown;
+  return recognised ? wrong_format(path, format, wanted) : parsed.error();
+}
+
 namespace {
 
 std::string beside(const std::string& config, const std::string& file) {
@@ -91,7 +101,57 @@ void search_everything(const ParameterTable& table, std::vector<Gene>& genes) {
 
 // `known`: none, or whose robot and program these are.
 Result<Config> parse(std::string_view text, const std::string& path, const ProgramStarter& start,
-                     const Problem* known);
+                     const Problem* known) {
+  ASSIGN_OR_RETURN(const auto parsed, parse_wanted(text, path, "a config"));
+  if (parsed.contains("model")) {
+    return text_error(path, {}, "a model", "a config",
+                      "predict and simulate take models; evolving needs a config");
+  }
+  if (parsed.contains("drive")) {
+    return text_error(
+        path, {}, "a robot's file", "a config",
+        "gapfarm robot " + path + " --out COPY --config CONFIG --runs FOLDER writes one");
+  }
+  Config config;
+  config.path = path;
+  config.text = text;
+  TomlErrors errors(path);
+  TomlSection top(parsed, "", errors);
+  read_top(top, config);
+  Problem& problem = config.problem;
+  const ScenarioForm& form = scenario_form(problem.scenario);
+  if ((form.robot || form.other_robot) && !read_robot_section(top, known, config))
+    return errors.error();
+  if (form.windows) read_runs_section(top, config);
+  if (form.program && !read_external_section(top, config.path, start, known, problem)) {
+    return errors.error();
+  }
+  const ParameterTable& table = problem.table();
+  problem.values = problem.tracked ? problem.tracked->values() : table.nominal();
+  problem.commands = default_commands(problem.scenario);
+  read_parameters(top, table, problem.values);
+  read_genes(top, table, problem.genes);
+  if (form.objective) {
+    if (problem.genes.empty()) search_everything(table, problem.genes);
+  } else {
+    read_motions(top, form, config);
+  }
+  read_evolution(top, config.evolution);
+  read_optimiser(top, config.evolution.optimiser);
+  const bool front = config.evolution.optimiser.kind == OptimiserKind::kNsga2;
+  if (front == problem.fitness.objectives.empty()) {
+    errors.add(parsed.source().begin,
+               front ? "optimiser nsga2 needs several objectives: [fitness] objectives = "
+                       "[\"position\", \"heading\"], or minimise and maximise in [objective]"
+                     : "several objectives need [optimiser] kind = \"nsga2\"; the other kinds "
+                       "search one fitness");
+  }
+  read_farm(top, config.farm);
+  top.find("stages");  // read by those who look at them: read_stages()
+  top.finish();
+  if (!errors.empty()) return errors.error();
+  return config;
+}
 
 }  // namespace
 
@@ -118,68 +178,6 @@ Result<Config> read_config(const std::string& path) {
   ASSIGN_OR_RETURN(auto text, read_text_file(file));
   return parse_config(text, file, start_program);
 }
-
-namespace {
-
-Result<Config> parse(std::string_view text, const std::string& path, const ProgramStarter& start,
-                     const Problem* known) {
-  auto parsed = parse_toml(text, path);
-  if (!parsed.ok()) {
-    const TextFormat format = sniff_format(text);
-    const bool recognised = format != TextFormat::kToml && format != TextFormat::kUnknown;
-    return recognised ? wrong_format(path, format, "a config") : parsed.error();
-  }
-  if (parsed->contains("model")) {
-    return text_error(path, {}, "a model", "a config",
-                      "predict and simulate take models; evolving needs a config");
-  }
-  if (parsed->contains("drive")) {
-    return text_error(
-        path, {}, "a robot's file", "a config",
-        "gapfarm robot " + path + " --out COPY --config CONFIG --runs FOLDER writes one");
-  }
-  Config config;
-  config.path = path;
-  config.text = text;
-  TomlErrors errors(path);
-  TomlSection top(*parsed, "", errors);
-  read_top(top, config);
-  Problem& problem = config.problem;
-  const ScenarioForm& form = scenario_form(problem.scenario);
-  if ((form.robot || form.other_robot) && !read_robot_section(top, known, config))
-    return errors.error();
-  if (form.windows) read_runs_section(top, config);
-  if (form.program && !read_external_section(top, config.path, start, known, problem)) {
-    return errors.error();
-  }
-  const ParameterTable& table = problem.table();
-  problem.values = problem.tracked ? problem.tracked->values() : table.nominal();
-  problem.commands = default_commands(problem.scenario);
-  read_parameters(top, table, problem.values);
-  read_genes(top, table, problem.genes);
-  if (form.objective) {
-    if (problem.genes.empty()) search_everything(table, problem.genes);
-  } else {
-    read_motions(top, form, config);
-  }
-  read_evolution(top, config.evolution);
-  read_optimiser(top, config.evolution.optimiser);
-  const bool front = config.evolution.optimiser.kind == OptimiserKind::kNsga2;
-  if (front == problem.fitness.objectives.empty()) {
-    errors.add(parsed->source().begin,
-               front ? "optimiser nsga2 needs several objectives: [fitness] objectives = "
-                       "[\"position\", \"heading\"], or minimise and maximise in [objective]"
-                     : "several objectives need [optimiser] kind = \"nsga2\"; the other kinds "
-                       "search one fitness");
-  }
-  read_farm(top, config.farm);
-  top.find("stages");  // read by those who look at them: read_stages()
-  top.finish();
-  if (!errors.empty()) return errors.error();
-  return config;
-}
-
-}  // namespace
 
 Status check_moves(const std::string& scenario, const std::string& path) {
   if (!scenario_form(scenario).objective) return {};
@@ -210,16 +208,6 @@ void merge(toml::table& base, const toml::table& changes) {
       base.insert_or_assign(key, node);
     }
   }
-}
-
-// toml++ sorts keys; the author's order means something.
-std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table) {
-  std::vector<std::pair<std::string, const toml::node*>> nodes;
-  for (const auto& [key, node] : table) nodes.emplace_back(key.str(), &node);
-  std::stable_sort(nodes.begin(), nodes.end(), [](const auto& a, const auto& b) {
-    return a.second->source().begin < b.second->source().begin;
-  });
-  return nodes;
 }
 
 Result<Variant> read_variant(const std::string& name, const toml::table& changes, toml::table base,
@@ -264,8 +252,7 @@ Result<Comparison> read_comparison(const std::string& path) {
   if (!variants || variants->table().empty()) {
     return Error{path + ": there are no variants; add sections such as [variants.small]"};
   }
-  const std::string base_path =
-      (std::filesystem::path(path).parent_path() / config).lexically_normal().string();
+  const std::string base_path = beside(path, config);
   ASSIGN_OR_RETURN(const auto base_text, read_text_file(base_path));
   ASSIGN_OR_RETURN(const auto base, parse_toml(base_text, base_path));
   for (const auto& [name, section] : in_file_order(variants->table())) {
@@ -347,9 +334,8 @@ Result<StagePlan> read_stages(const Config& config) {
   }
   if (auto validation = top.section("validation")) {
     if (const auto files = validation->strings(config.problem.windows() ? "folders" : "trials")) {
-      const std::filesystem::path folder = std::filesystem::path(config.path).parent_path();
       for (const std::string& file : *files) {
-        plan.validation_files.push_back((folder / file).lexically_normal().string());
+        plan.validation_files.push_back(beside(config.path, file));
       }
     }
     validation->finish();

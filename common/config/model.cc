@@ -6,7 +6,6 @@
 #include "common/base/build_info.h"
 #include "common/config/sections.h"
 #include "common/trials/files.h"
-#include "common/trials/format.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -124,18 +123,13 @@ bool is_model(std::string_view text) {
 }
 
 Result<Model> parse_model(std::string_view text, const std::string& path) {
-  auto parsed = parse_toml(text, path);
-  if (!parsed.ok()) {
-    const TextFormat format = sniff_format(text);
-    const bool recognised = format != TextFormat::kToml && format != TextFormat::kUnknown;
-    return recognised ? wrong_format(path, format, "a model") : parsed.error();
-  }
-  if (!parsed->contains("model")) {
+  ASSIGN_OR_RETURN(const auto parsed, parse_wanted(text, path, "a model"));
+  if (!parsed.contains("model")) {
     return text_error(path, {}, "no key 'model'", "a model",
                       "a config is evolved into one by 'gapfarm evolve'");
   }
   TomlErrors errors(path);
-  TomlSection top(*parsed, "", errors);
+  TomlSection top(parsed, "", errors);
   if (top.count("model", 0, std::numeric_limits<std::uint64_t>::max()).value_or(1) != 1) {
     top.fail("model",
              "model is of another format version, expected 1; use the program that "

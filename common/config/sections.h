@@ -8,6 +8,10 @@
 
 namespace gapfarm {
 
+// The file as TOML; what it is where that is known and not TOML.
+Result<toml::table> parse_wanted(std::string_view text, const std::string& path,
+                                 const char* wanted);
+
 // [external] or [objective].  False when there is no program to go on with.
 bool read_external_section(TomlSection& top, const std::string& config_path,
                            const ProgramStarter& start, const Problem* known, Problem& problem);

@@ -36,6 +36,15 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file) {
   }
 }
 
+std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table) {
+  std::vector<std::pair<std::string, const toml::node*>> nodes;
+  for (const auto& [key, node] : table) nodes.emplace_back(key.str(), &node);
+  std::stable_sort(nodes.begin(), nodes.end(), [](const auto& a, const auto& b) {
+    return a.second->source().begin < b.second->source().begin;
+  });
+  return nodes;
+}
+
 std::string toml_type_name(const toml::node& node) {
   // By toml::node_type; what follows these are dates and times.
   constexpr std::array kNames = {"nothing",    "a section", "an array", "a string",

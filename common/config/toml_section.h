@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -41,6 +42,9 @@ class TomlErrors {
 
 // Debian's toml++ is built to throw; its exceptions end here.
 Result<toml::table> parse_toml(std::string_view text, const std::string& file);
+
+// toml++ sorts keys; the author's order means something.
+std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table);
 
 // "a string", "an array", for sentences.
 std::string toml_type_name(const toml::node& node);

@@ -120,12 +120,7 @@ void read_wheel(TomlSection& own, RobotWheel& wheel) {
 void read_wheels(TomlSection& top, std::vector<RobotWheel>& wheels) {
   auto section = top.section("wheels");
   if (!section) return;
-  std::vector<std::pair<toml::source_position, std::string>> names;  // in the file's order
-  for (const auto& [key, node] : section->table()) {
-    names.emplace_back(key.source().begin, std::string(key.str()));
-  }
-  std::ranges::stable_sort(names, [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (const auto& [place, name] : names) {
+  for (const auto& [name, node] : in_file_order(section->table())) {
     auto own = section->section(name);
     if (!own) continue;
     RobotWheel wheel;

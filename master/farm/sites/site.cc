@@ -10,10 +10,6 @@
 namespace gapfarm {
 namespace {
 
-void read_strings(TomlSection& section, const char* key, std::vector<std::string>* to) {
-  if (auto found = section.strings(key)) *to = std::move(*found);
-}
-
 void read_pattern(TomlSection& section, const char* key, std::string* to) {
   section.read(key, *to);
   try {
@@ -31,9 +27,9 @@ Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
   TomlSection top(table, "", errors);
   ClusterSite site;
   top.read("system", site.system);
-  read_strings(top, "hosts", &site.hosts);
+  top.read("hosts", site.hosts);
   top.read("jobs_per_host", site.jobs_per_host, 0, 100000);
-  read_strings(top, "submit", &site.submit);
+  top.read("submit", site.submit);
   top.read("script", site.script);
   top.read("script_a_job", site.script_a_job);
   top.read("block", site.block, 1, 100000);
@@ -41,19 +37,19 @@ Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
   top.read("ids", site.ids);
   top.read("first_index", site.first_index, 0, 1);
   read_pattern(top, "limit", &site.limit);
-  read_strings(top, "wall", &site.wall);
-  read_strings(top, "several", &site.several);
-  read_strings(top, "avoid", &site.avoid);
+  top.read("wall", site.wall);
+  top.read("several", site.several);
+  top.read("avoid", site.avoid);
   top.read("nodes_between", site.nodes_between);
-  read_strings(top, "list", &site.list);
+  top.read("list", site.list);
   read_pattern(top, "line", &site.line);
-  read_strings(top, "columns", &site.columns);
-  read_strings(top, "queued", &site.queued);
-  read_strings(top, "ended", &site.ended);
-  read_strings(top, "stuck", &site.stuck);
-  read_strings(top, "cancel", &site.cancel);
-  read_strings(top, "log", &site.log);
-  read_strings(top, "master", &site.master);
+  top.read("columns", site.columns);
+  top.read("queued", site.queued);
+  top.read("ended", site.ended);
+  top.read("stuck", site.stuck);
+  top.read("cancel", site.cancel);
+  top.read("log", site.log);
+  top.read("master", site.master);
   top.read("requeue", site.requeue);
   top.read("worker", site.worker);
   top.read("keys", site.keys);
