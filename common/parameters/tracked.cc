@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdlib>
 
 #include "common/base/constants.h"
 #include "common/base/text.h"
@@ -57,8 +56,8 @@ const TreadNumbers& srv1_numbers() {
   return numbers;
 }
 
-// Bounds are no measurements: three digits do.
-double three_digits(double value) { return std::strtod(formatted("%.3g", value).c_str(), nullptr); }
+// Bounds are no measurements.
+double three_digits(double value) { return rounded_to_digits(value, 3); }
 
 Parameter scaled(double factor, Parameter row) {
   row.lower = three_digits(row.lower * factor);
