@@ -164,7 +164,7 @@ EvolveSummary summarise(const Optimiser& optimiser,
 namespace {
 
 // In the candidates' order.
-Result<std::vector<Score>> scores_of(EvaluationBackend& backend,
+Result<std::vector<Score>> scores_of(const ScoreCandidates& score_all,
                                      std::vector<Candidate> candidates) {
   const std::size_t asked = candidates.size();
   std::size_t got = 0;
@@ -174,7 +174,7 @@ Result<std::vector<Score>> scores_of(EvaluationBackend& backend,
     ++got;
     return Result<std::vector<Candidate>>(std::vector<Candidate>());
   };
-  RETURN_IF_ERROR(backend.stream(std::move(candidates), take));
+  RETURN_IF_ERROR(score_all(std::move(candidates), take));
   if (got == asked) return scores;
   return Error{"asked for " + std::to_string(asked) + " scores, but got " + std::to_string(got)};
 }
@@ -184,15 +184,15 @@ class IslandLoop {
  public:
   using Stop = std::pair<StopReason, std::string>;
 
-  IslandLoop(Optimiser& optimiser, GenerationSink& sink, const EvolveOptions& options,
+  IslandLoop(Optimiser& optimiser, const KeepGeneration& keep, const EvolveOptions& options,
              std::function<double()> spent_s)
       : optimiser_(optimiser),
         islands_(*optimiser.islands()),
-        sink_(sink),
+        keep_(keep),
         options_(options),
         spent_s_(std::move(spent_s)) {}
 
-  // Begins what may begin and commits what is complete.  Error: the sink's, or one of code kStopped
+  // Begins what may begin and commits what is complete.  Error: keep()'s, or one of code kStopped
   // when stop() has something to say.
   Result<std::vector<Candidate>> go_on() {
     std::vector<Candidate> candidates;
@@ -245,13 +245,13 @@ class IslandLoop {
     const double now_s = spent_s_();
     record.wall_s = now_s - committed_s_;
     committed_s_ = now_s;
-    RETURN_IF_ERROR(sink_.commit(record));
+    RETURN_IF_ERROR(keep_(record));
     return true;
   }
 
   Optimiser& optimiser_;
   Islands& islands_;
-  GenerationSink& sink_;
+  const KeepGeneration& keep_;
   const EvolveOptions& options_;
   std::function<double()> spent_s_;
   double committed_s_ = options_.spent_s;
@@ -263,20 +263,20 @@ class IslandLoop {
 
 }  // namespace
 
-Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
-                             const EvolveClock& clock, const EvolveOptions& options,
+Result<EvolveSummary> evolve(Optimiser& optimiser, const ScoreCandidates& score,
+                             const KeepGeneration& keep, const EvolveClock& clock,
+                             const EvolveOptions& options,
                              const std::function<bool()>& stop_requested) {
   const double began_s = clock();
   const auto spent_s = [&] { return options.spent_s + clock() - began_s; };
   const auto requested = [&] { return stop_requested && stop_requested(); };
 
   if (optimiser.islands() != nullptr) {
-    IslandLoop loop(optimiser, sink, options, spent_s);
+    IslandLoop loop(optimiser, keep, options, spent_s);
     const auto run = [&]() -> Status {
       ASSIGN_OR_RETURN(auto first, loop.go_on());
-      return backend.stream(std::move(first), [&](std::size_t place, const Score& score) {
-        return loop.take(place, score);
-      });
+      return score(std::move(first),
+                   [&](std::size_t place, const Score& its) { return loop.take(place, its); });
     };
     const Status status = run();
     if (loop.stop()) return summarise(optimiser, *loop.stop(), spent_s());
@@ -290,7 +290,7 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, G
     const double generation_began_s = clock();
     const std::uint64_t generation = optimiser.generation();
     while (optimiser.generation() == generation) {
-      const auto scores = scores_of(backend, optimiser.ask());
+      const auto scores = scores_of(score, optimiser.ask());
       if (!scores && requested()) {
         stop = reason_to_stop(optimiser, options, spent_s(), true);
         return summarise(optimiser, *stop, spent_s());
@@ -301,7 +301,7 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, G
 
     GenerationRecord record = record_generation(optimiser);
     record.wall_s = clock() - generation_began_s;
-    RETURN_IF_ERROR(sink.commit(record));
+    RETURN_IF_ERROR(keep(record));
   }
 }
 

@@ -21,19 +21,14 @@ namespace gapfarm {
 double cost_of_fitness(FitnessKind kind, double fitness);
 double fitness_of_cost(FitnessKind kind, double cost);
 
-// Scores candidates.  An error ends the run, unless a stop was requested: then the generation is
-// dropped, to be asked again after a resume.
-class EvaluationBackend {
- public:
-  virtual ~EvaluationBackend() = default;
-
-  // Takes a score by its candidate's place, counted over the call, and says what else to score.
-  using TakeScore =
-      std::function<Result<std::vector<Candidate>>(std::size_t place, const Score& score)>;
-  // Every score goes to `take` when it is there, in any order.  Ends when nothing is left to score,
-  // or with an error of `take`.
-  virtual Status stream(std::vector<Candidate> candidates, const TakeScore& take) = 0;
-};
+// Takes a score by its candidate's place, counted over the call, and says what else to score.
+using TakeScore =
+    std::function<Result<std::vector<Candidate>>(std::size_t place, const Score& score)>;
+// Scores candidates: every score goes to `take` when it is there, in any order.  Ends when nothing
+// is left to score, or with an error, its own or `take`'s.  It ends the run, unless a stop was
+// requested: then the generation is dropped, to be asked again after a resume.
+using ScoreCandidates =
+    std::function<Status(std::vector<Candidate> candidates, const TakeScore& take)>;
 
 struct GenerationRecord {
   std::uint64_t generation = 0;  // from 1
@@ -45,12 +40,8 @@ struct GenerationRecord {
   std::string optimiser_state;      // after this generation
 };
 
-// Keeps a generation; it counts as done once commit() returned.  This one keeps nothing.
-class GenerationSink {
- public:
-  virtual ~GenerationSink() = default;
-  virtual Status commit(const GenerationRecord& /*record*/) { return {}; }
-};
+// Keeps a generation; it counts as done once this returned.
+using KeepGeneration = std::function<Status(const GenerationRecord& record)>;
 
 constexpr std::uint64_t kMostAhead = 16;  // generations of an island
 
@@ -93,9 +84,10 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
 // the slowest than kMostAhead generations, and to the same generations to the bit as if they
 // waited for one another; what they did ahead of the last commit is lost when the run stops, unless
 // by a number of generations or evaluations.  `stop_requested` is polled between generations
-// (the backend is notified separately).  Errors: of the backend or the sink.
-Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
-                             const EvolveClock& clock, const EvolveOptions& options,
+// (who scores is notified separately).  Errors: of `score` or `keep`.
+Result<EvolveSummary> evolve(Optimiser& optimiser, const ScoreCandidates& score,
+                             const KeepGeneration& keep, const EvolveClock& clock,
+                             const EvolveOptions& options,
                              const std::function<bool()>& stop_requested = {});
 
 // The steps of evolve() that look at the optimiser without driving it.

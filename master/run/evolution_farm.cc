@@ -205,33 +205,32 @@ void FarmProgressWriter::refresh(double now_s) {
   if (Status s = store_.set_progress(last_); !s) watcher_.error(s.error());
 }
 
-FarmBackend::FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed,
-                         FarmProgressWriter& progress)
-    : farm_(farm), problem_(problem), seed_(seed), progress_(progress) {
-  problem_hash_ = farm.add_problem(to_proto(problem));
-}
-
-Status FarmBackend::stream(std::vector<Candidate> candidates, const TakeScore& take) {
-  FailureNotes failures(problem_, progress_, candidates.size());
-  const std::uint64_t before = progress_.evaluations_before();
-  const auto sent = [&](std::span<const Candidate> all) {
-    std::vector<v1::Task> tasks =
-        mapped(all, [&](const Candidate& candidate) { return evaluation_task(candidate, seed_); });
-    failures.asked(tasks);
-    return tasks;
+ScoreCandidates farm_scores(Farm& farm, const Problem& problem, std::uint64_t seed,
+                            FarmProgressWriter& progress) {
+  const std::string hash = farm.add_problem(to_proto(problem));
+  return [&farm, &problem, &progress, seed, hash](std::vector<Candidate> candidates,
+                                                  const TakeScore& take) {
+    FailureNotes failures(problem, progress, candidates.size());
+    const std::uint64_t before = progress.evaluations_before();
+    const auto sent = [&](std::span<const Candidate> all) {
+      std::vector<v1::Task> tasks =
+          mapped(all, [&](const Candidate& candidate) { return evaluation_task(candidate, seed); });
+      failures.asked(tasks);
+      return tasks;
+    };
+    const auto on_answer = [&](std::size_t place,
+                               const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
+      failures.answered(place, result);
+      ASSIGN_OR_RETURN(const Score score, score_of(result, problem.fitness));
+      ASSIGN_OR_RETURN(const auto next, take(place, score));
+      return sent(next);
+    };
+    const Status status =
+        farm.stream(hash, sent(candidates), on_answer,
+                    [&](const FarmProgress& done) { progress.on_progress(done, before); });
+    failures.note();
+    return status;
   };
-  const auto on_answer = [&](std::size_t place,
-                             const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
-    failures.answered(place, result);
-    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness));
-    ASSIGN_OR_RETURN(const auto next, take(place, score));
-    return sent(next);
-  };
-  const Status status =
-      farm_.stream(problem_hash_, sent(candidates), on_answer,
-                   [&](const FarmProgress& progress) { progress_.on_progress(progress, before); });
-  failures.note();
-  return status;
 }
 
 Status StoreSink::commit(const GenerationRecord& record) {

@@ -97,25 +97,16 @@ class FarmProgressWriter {
   WorkerWait wait_;
 };
 
-// Candidates to EvaluateTasks and back.
-class FarmBackend : public EvaluationBackend {
- public:
-  FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed, FarmProgressWriter& progress);
-  Status stream(std::vector<Candidate> candidates, const TakeScore& take) override;
+// Candidates to EvaluateTasks and back.  The arguments outlive it.
+ScoreCandidates farm_scores(Farm& farm, const Problem& problem, std::uint64_t seed,
+                            FarmProgressWriter& progress);
 
- private:
-  Farm& farm_;
-  const Problem& problem_;
-  std::uint64_t seed_;
-  FarmProgressWriter& progress_;
-  std::string problem_hash_;
-};
-
-class StoreSink : public GenerationSink {
+// Keeps generations in the store.
+class StoreSink {
  public:
   StoreSink(RunStore& store, const Problem& problem, const Farm& farm, FarmProgressWriter& progress)
       : store_(store), problem_(problem), farm_(farm), progress_(progress) {}
-  Status commit(const GenerationRecord& record) override;
+  Status commit(const GenerationRecord& record);
   // Tasks that this master's farm gave up, of the generations committed here.
   std::uint64_t quarantined() const { return quarantined_; }
 

@@ -147,13 +147,15 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,
                               watcher);
   progress.watch(&request.log, &events);
-  FarmBackend backend(**farm, request.problem, request.config.seed, progress);
+  const ScoreCandidates score = farm_scores(**farm, request.problem, request.config.seed, progress);
   StoreSink sink(store, request.problem, **farm, progress);
   EvolveOptions options;
   options.settings = request.config.evolution;
   options.fitness = request.problem.fitness.kind;
   if (inputs->checkpoint) options.spent_s = inputs->checkpoint->wall_s;
-  auto evolved = evolve(**optimiser, backend, sink, clock, options, request.stop_requested);
+  auto evolved = evolve(
+      **optimiser, score, [&](const GenerationRecord& record) { return sink.commit(record); },
+      clock, options, request.stop_requested);
   watcher.progress("", false);
   events.flush();
   if (!evolved) return stopped_by(store, evolved.error(), progress.now());

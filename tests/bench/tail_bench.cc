@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::uint64_t kFirst = 4, kLast = 16;  // generations between which is measured
 
-class VirtualFarm : public EvaluationBackend {
+class VirtualFarm {
  public:
   VirtualFarm(const ToyRun& run, unsigned workers, double sigma, unsigned window)
       : run_(run), farm_(1, workers, without_faults(window)), sigma_(sigma) {}
@@ -30,7 +30,7 @@ class VirtualFarm : public EvaluationBackend {
   double now_s() const { return farm_.now(); }
   double worked_s() const { return worked_s_; }
 
-  Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
+  Status operator()(std::vector<Candidate> candidates, const TakeScore& take) {
     std::vector<Score> scores;
     std::vector<double> times_s;
     const auto sent = [&](const std::vector<Candidate>& all) {
@@ -79,10 +79,10 @@ class VirtualFarm : public EvaluationBackend {
   double worked_s_ = 0;
 };
 
-class Stopwatch : public GenerationSink {
+class Stopwatch {
  public:
   explicit Stopwatch(const VirtualFarm& farm) : farm_(farm) {}
-  Status commit(const GenerationRecord& record) override {
+  Status operator()(const GenerationRecord& record) {
     if (record.generation == kFirst) begun_ = {farm_.now_s(), farm_.worked_s()};
     if (record.generation < kLast) return {};
     ended_ = {farm_.now_s(), farm_.worked_s()};
@@ -112,7 +112,7 @@ void tail(benchmark::State& state) {
     options.fitness = FitnessKind::kEnergyScore;
     benchmark::DoNotOptimize(
         evolve(
-            run.optimiser(), farm, watch, [&] { return farm.now_s(); }, options)
+            run.optimiser(), std::ref(farm), std::ref(watch), [&] { return farm.now_s(); }, options)
             .ok());
     state.counters["efficiency"] = watch.busy_workers() / workers;
   }

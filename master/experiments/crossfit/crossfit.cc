@@ -226,32 +226,22 @@ std::vector<ProgressStage> stages_of(const std::vector<std::string>& groups,
   });
 }
 
-class Backend : public EvaluationBackend {
- public:
-  Backend(const Problem& problem, Farm& farm, std::uint64_t seed)
-      : fitness_(problem.fitness), farm_(farm), seed_(seed) {
-    hash_ = farm.add_problem(to_proto(problem));
-  }
-
-  Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
-    const auto tasks_of = [&](std::span<const Candidate> of) {
-      return mapped(of, [&](const Candidate& c) { return evaluation_task(c, seed_); });
+ScoreCandidates scores_by(Farm& farm, const Problem& problem, std::uint64_t seed) {
+  const std::string hash = farm.add_problem(to_proto(problem));
+  return [&farm, hash, seed, fitness = problem.fitness](const std::vector<Candidate>& candidates,
+                                                        const TakeScore& take) {
+    const auto tasks_of = [&](const std::vector<Candidate>& of) {
+      return mapped(of, [&](const Candidate& c) { return evaluation_task(c, seed); });
     };
-    return farm_.stream(
-        hash_, tasks_of(candidates),
-        [&](std::size_t place, const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
-          ASSIGN_OR_RETURN(const Score score, score_of(result, fitness_));
-          ASSIGN_OR_RETURN(const auto more, take(place, score));
-          return tasks_of(more);
-        });
-  }
-
- private:
-  FitnessSettings fitness_;
-  Farm& farm_;
-  std::uint64_t seed_;
-  std::string hash_;
-};
+    const auto on_answer = [&](std::size_t place,
+                               const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
+      ASSIGN_OR_RETURN(const Score score, score_of(result, fitness));
+      ASSIGN_OR_RETURN(const auto more, take(place, score));
+      return tasks_of(more);
+    };
+    return farm.stream(hash, tasks_of(candidates), on_answer);
+  };
+}
 
 }  // namespace
 
@@ -306,13 +296,12 @@ Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& set
     return encode_gene(problem.table(), gene, problem.values[gene.row]);
   });
   ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
-  Backend backend(problem, farm, settings.seed);
-  GenerationSink sink;
   EvolveOptions options;
   options.settings = settings.evolution;
   options.fitness = problem.fitness.kind;
-  ASSIGN_OR_RETURN(const auto summary,
-                   evolve(*optimiser, backend, sink, monotonic_seconds, options));
+  const auto keep_none = [](const GenerationRecord&) { return Status(); };
+  ASSIGN_OR_RETURN(const auto summary, evolve(*optimiser, scores_by(farm, problem, settings.seed),
+                                              keep_none, monotonic_seconds, options));
   if (!summary.best || summary.best->standing.outcome != v1::OK) {
     return Error{"every genome failed; widen or move the genes' ranges"};
   }

@@ -9,10 +9,10 @@
 namespace gapfarm::evolve_test {
 
 // Scores by a toy; each generation takes 2 s of the fake clock.
-class ToyBackend : public EvaluationBackend {
+class ToyBackend {
  public:
   ToyBackend(const ToyRun& run, double& clock) : run_(run), clock_(clock) {}
-  Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
+  Status operator()(std::vector<Candidate> candidates, const TakeScore& take) {
     clock_ += 2;
     if (on_call) on_call();
     if (fail) return Error{"no worker can be had"};
@@ -32,9 +32,9 @@ class ToyBackend : public EvaluationBackend {
   double& clock_;
 };
 
-class KeepingSink : public GenerationSink {
+class KeepingSink {
  public:
-  Status commit(const GenerationRecord& record) override {
+  Status operator()(const GenerationRecord& record) {
     if (record.generation == refuse) return Error{"disk full"};
     records.push_back(record);
     return {};
@@ -59,7 +59,8 @@ class EvolveTest : public testing::Test {
     options_.fitness = FitnessKind::kEnergyScore;
   }
   Result<EvolveSummary> go() {
-    return evolve(run_.optimiser(), backend_, sink_, clock_, options_, [this] { return stop_; });
+    return evolve(run_.optimiser(), std::ref(backend_), std::ref(sink_), clock_, options_,
+                  [this] { return stop_; });
   }
 
   ToyRun run_{sphere(3), EvolutionSettings{}, 1};
@@ -109,7 +110,9 @@ TEST_F(EvolveTest, StopsAtItsTargetInTheFitnesssOwnSense) {
   ToyRun other(sphere(3), EvolutionSettings{}, 1);
   options_.fitness = FitnessKind::kLogScore;
   options_.settings.target_fitness = -0.5;
-  EXPECT_EQ(evolve(other.optimiser(), backend_, sink_, clock_, options_).value().generations,
+  EXPECT_EQ(evolve(other.optimiser(), std::ref(backend_), std::ref(sink_), clock_, options_)
+                .value()
+                .generations,
             summary.generations);
 }
 
@@ -157,7 +160,7 @@ TEST_F(EvolveTest, ResumingFromAnyGenerationGivesTheSameDigests) {
   for (const GenerationRecord& from : records) {
     auto optimiser = restore_optimiser(run_.setup(), from.optimiser_state).value();
     KeepingSink rest;
-    ASSERT_TRUE(evolve(*optimiser, backend_, rest, clock_, options_));
+    ASSERT_TRUE(evolve(*optimiser, std::ref(backend_), std::ref(rest), clock_, options_));
     EXPECT_EQ(
         digests(rest.records),
         digests({records.begin() + static_cast<std::ptrdiff_t>(from.generation), records.end()}));
@@ -170,8 +173,8 @@ TEST_F(EvolveTest, DigestsIgnoreTimeAndShowSeedsApart) {
   ToyRun same(sphere(3), EvolutionSettings{}, 1), other(sphere(3), EvolutionSettings{}, 2);
   backend_.on_call = [&] { now_ += 5; };
   KeepingSink of_same, of_other;
-  ASSERT_TRUE(evolve(same.optimiser(), backend_, of_same, clock_, options_));
-  ASSERT_TRUE(evolve(other.optimiser(), backend_, of_other, clock_, options_));
+  ASSERT_TRUE(evolve(same.optimiser(), std::ref(backend_), std::ref(of_same), clock_, options_));
+  ASSERT_TRUE(evolve(other.optimiser(), std::ref(backend_), std::ref(of_other), clock_, options_));
   EXPECT_EQ(digests(of_same.records), whole);
   EXPECT_NE(digests(of_other.records).back(), whole.back());
 }

@@ -20,9 +20,9 @@ using testing::SizeIs;
 
 double no_clock() { return 0; }
 
-class Keeping : public GenerationSink {
+class Keeping {
  public:
-  Status commit(const GenerationRecord& record) override {
+  Status operator()(const GenerationRecord& record) {
     digests.push_back(members_digest(record.generation, record.members) + record.optimiser_state);
     evaluations = record.evaluations;
     return {};
@@ -32,12 +32,12 @@ class Keeping : public GenerationSink {
 };
 
 // Answers one candidate at a time: the oldest with probability `fifo`, else any.
-class Unordered : public EvaluationBackend {
+class Unordered {
  public:
   Unordered(const ToyRun& run, unsigned seed, double fifo)
       : run_(run), random_(seed), fifo_(fifo) {}
 
-  Status stream(std::vector<Candidate> candidates, const TakeScore& take) override {
+  Status operator()(std::vector<Candidate> candidates, const TakeScore& take) {
     std::vector<std::pair<std::size_t, Candidate>> out;
     const auto send = [&](const std::vector<Candidate>& more) {
       for (const Candidate& candidate : more) out.emplace_back(asked++, candidate);
@@ -108,7 +108,7 @@ class AnyOrder : public testing::TestWithParam<Case> {
     Keeping sink;
     EvolveOptions options;
     options.settings = settings;
-    EXPECT_TRUE(evolve(run.optimiser(), backend, sink, no_clock, options).ok());
+    EXPECT_TRUE(evolve(run.optimiser(), std::ref(backend), std::ref(sink), no_clock, options).ok());
     EXPECT_EQ(backend.asked, sink.evaluations) << "nothing is scored that no generation needs";
     return sink.digests;
   }
@@ -213,8 +213,9 @@ TEST(Islands, StopAtEvaluationsWithoutDoingMore) {
   Keeping sink;
   EvolveOptions options;
   options.settings = settings;
-  EXPECT_EQ(evolve(run.optimiser(), backend, sink, no_clock, options).value().reason,
-            StopReason::kEvaluations);
+  EXPECT_EQ(
+      evolve(run.optimiser(), std::ref(backend), std::ref(sink), no_clock, options).value().reason,
+      StopReason::kEvaluations);
   EXPECT_EQ(backend.asked, sink.evaluations);
   EXPECT_THAT(sink.digests, SizeIs(4));
 }
