@@ -220,6 +220,15 @@ void CountingOptimiser::update_best(std::uint64_t generation) {
   if (first || better(best_.standing, before)) last_improvement_ = generation;
 }
 
+std::vector<Individual> CountingOptimiser::members() const {
+  std::vector<Individual> members;
+  if (generation_ > 0) members.push_back(best());
+  for (const Individual& individual : population_) {
+    if (individual.birth_id != best_.birth_id) members.push_back(individual);
+  }
+  return members;
+}
+
 void CountingOptimiser::save_counts(bool with_best, v1::GeneticState& message) const {
   message.set_generation(generation_);
   message.set_next_birth_id(next_birth_id_);

@@ -97,6 +97,7 @@ class CountingOptimiser : public Optimiser {
   std::uint64_t evaluations() const override { return evaluations_; }
   std::uint64_t last_improvement() const override { return last_improvement_; }
   const Individual& best() const override { return best_; }
+  std::vector<Individual> members() const override;  // the best, and what else the population has
   double diversity() const override { return diversity_of(population_); }
 
  protected:

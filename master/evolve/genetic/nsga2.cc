@@ -72,7 +72,6 @@ class Nsga2 final : public CountingOptimiser {
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
 
-  std::vector<Individual> members() const override;
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string state() const override;
   Status restore(std::string_view state) override;
@@ -259,15 +258,6 @@ void Nsga2::note_best() {
   best_ = population_[best.empty() ? 0 : knee_of(best)];
   if (!reference_.empty() || best.empty()) return;
   reference_ = greatest_of(costs_of_all());
-}
-
-std::vector<Individual> Nsga2::members() const {
-  std::vector<Individual> members;
-  if (generation_ > 0) members.push_back(best_);
-  for (const Individual& individual : population_) {
-    if (individual.birth_id != best_.birth_id) members.push_back(individual);
-  }
-  return members;
 }
 
 std::vector<NamedNumber> Nsga2::operator_probabilities() const {

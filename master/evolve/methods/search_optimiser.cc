@@ -227,15 +227,6 @@ std::string SearchOptimiser::reason() const {
          "may be noise, up to " + std::to_string(full_scores_) + " times (elite_replicates)";
 }
 
-std::vector<Individual> SearchOptimiser::members() const {
-  std::vector<Individual> members;
-  if (generation_ > 0) members.push_back(complete_best_);
-  for (const Individual& individual : population_) {
-    if (individual.birth_id != best_.birth_id) members.push_back(individual);
-  }
-  return members;
-}
-
 std::string SearchOptimiser::state() const {
   assert(!plan_ && proposed_ == 0 && "save between tell() and ask()");
   v1::SearchState message;

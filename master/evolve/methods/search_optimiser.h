@@ -32,7 +32,6 @@ class SearchOptimiser final : public CountingOptimiser {
   void tell(std::span<const Score> scores) override;
   void meet(std::span<const std::vector<Individual>> others) override;
 
-  std::vector<Individual> members() const override;  // the generation's proposals and the best
   const Individual& best() const override { return complete_best_; }
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string reason() const override;
