@@ -146,6 +146,13 @@ inline StreamKey stream_key(const v1::StreamKey& task, Purpose purpose) {
   return stream_key(task, purpose, task.replicate());
 }
 
+// Of the `k`-th of what is drawn apart within one evaluation: its number shares a word with the
+// replicate's, so that they draw independently.
+inline StreamKey evaluation_key(const v1::StreamKey& task, std::size_t k) {
+  return stream_key(task, Purpose::kEvaluation,
+                    task.replicate() | static_cast<std::uint64_t>(k + 1) << 32);
+}
+
 // The noise of one reading.
 inline Pose drawn_noise(const PoseNoise& noise, Stream& stream) {
   const double x = noise.position_m * stream.normal();

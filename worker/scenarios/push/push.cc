@@ -173,10 +173,7 @@ Offsets PushModelOfLog::offsets(const PushNoise& noise, const PredictOptions& op
                                 std::uint32_t trial) const {
   if (options.means_only) return {Pose()};
   if (problem_.spread.kind == SpreadKind::kCubature) return cubature_offsets(noise.pose);
-  // The trial's number shares a word with the replicate's, so that trials draw independently.
-  Stream stream(
-      stream_key(options.stream, Purpose::kEvaluation,
-                 options.stream.replicate() | static_cast<std::uint64_t>(trial + 1) << 32));
+  Stream stream(evaluation_key(options.stream, trial));
   Offsets drawn;
   for (unsigned i = 0; i < problem_.spread.replicates; ++i) {
     drawn.push_back(drawn_noise(noise.pose, stream));

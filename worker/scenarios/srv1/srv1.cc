@@ -152,10 +152,7 @@ class Srv1Model : public ScenarioModel {
 std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions& options,
                                     std::size_t group) const {
   if (problem_.spread.kind != SpreadKind::kSampled) return {};
-  // The group's number shares a word with the replicate's, so that groups draw independently.
-  Stream stream(
-      stream_key(options.stream, Purpose::kEvaluation,
-                 options.stream.replicate() | static_cast<std::uint64_t>(group + 1) << 32));
+  Stream stream(evaluation_key(options.stream, group));
   NoiseSettings core = robot.foreseen_noise();
   core.tails = {};
   std::vector<Gains> gains;
