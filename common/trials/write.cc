@@ -36,6 +36,20 @@ std::string extra_fields(const Trial& trial, const TrialLog& log) {
   return text + "\n";
 }
 
+// A line a sample, with what `place` writes of where it was.
+template <class Sample, class Place>
+std::string format_samples(const TrialLog& log, std::vector<std::string> columns,
+                           std::vector<Sample> Trial::*samples, const Place& place) {
+  std::string text = header(std::move(columns));
+  for (const Trial& trial : log.trials) {
+    const std::string key = csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
+    for (const Sample& sample : trial.*samples) {
+      text += key + format_double(sample.t_s) + "," + place(sample) + "\n";
+    }
+  }
+  return text;
+}
+
 bool is_finite(const Pose& pose) {
   return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.theta);
 }
@@ -95,26 +109,14 @@ std::string format_trials(const TrialLog& log) {
 }
 
 std::string format_paths(const TrialLog& log) {
-  std::string text = header(path_columns());
-  for (const Trial& trial : log.trials) {
-    const std::string key = csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
-    for (const PathSample& sample : trial.path) {
-      text += key + format_double(sample.t_s) + "," + pose_fields(sample.pose) + "\n";
-    }
-  }
-  return text;
+  return format_samples(log, path_columns(), &Trial::path,
+                        [](const PathSample& sample) { return pose_fields(sample.pose); });
 }
 
 std::string format_tips(const TrialLog& log) {
-  std::string text = header(tip_columns());
-  for (const Trial& trial : log.trials) {
-    const std::string key = csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
-    for (const TipSample& sample : trial.tip) {
-      text += key + format_double(sample.t_s) + "," + format_double(sample.x) + "," +
-              format_double(sample.y) + "\n";
-    }
-  }
-  return text;
+  return format_samples(log, tip_columns(), &Trial::tip, [](const TipSample& sample) {
+    return format_double(sample.x) + "," + format_double(sample.y);
+  });
 }
 
 std::vector<std::string> trial_file_names(const std::string& path, bool paths, bool tips) {
