@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
@@ -159,46 +157,20 @@ Result<int> import_runs(ImportOptions& options, CliContext& context) {
   return kExitDone;
 }
 
-struct ImportFormat {
-  const char* name;
-  TextFormat format;
-  const char* scenario;  // whose commands the log is in
-};
-
 // Drives of ground robots, in any of the formats of master/io/logs.
 constexpr const char* kRuns = "runs";
+constexpr const char* kBbautotune = "bbautotune";  // its robot is an SRV-1
 
-constexpr ImportFormat kFormats[] = {{"bbautotune", TextFormat::kBbautotune, "srv1"}};
-
-const ImportFormat* find_format(const std::string& name) {
-  for (const ImportFormat& format : kFormats) {
-    if (name == format.name) return &format;
-  }
-  return nullptr;
-}
-
-// OK when every file is what the user says it is.
-Status check_formats(const ImportOptions& options, const ImportFormat& wanted) {
+Result<TrialLog> read_bbautotune(const ImportOptions& options) {
   for (const std::string& file : options.files) {
     ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
     const TextFormat found = sniff_format(text);
-    if (found != wanted.format) return wrong_format(file, found, format_name(wanted.format));
+    if (found != TextFormat::kBbautotune) {
+      return wrong_format(file, found, format_name(TextFormat::kBbautotune));
+    }
   }
-  return {};
-}
-
-Result<TrialLog> read_logs(const ImportOptions& options) {
-  const ImportFormat* format = find_format(options.format);
-  if (!format) {
-    std::vector<std::string> known =
-        mapped(kFormats, [](const ImportFormat& one) { return std::string(one.name); });
-    known.emplace_back(kRuns);
-    return Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)};
-  }
-  RETURN_IF_ERROR(check_formats(options, *format));
-  std::vector<std::string> commands = mapped(
-      default_commands(format->scenario), [](const CommandSpec& command) { return command.name; });
-  return read_trial_files(options.files, commands, options.reading.read);
+  return read_trial_files(options.files, command_names(default_commands("srv1")),
+                          options.reading.read);
 }
 
 Result<int> run_import(ImportOptions& options, CliContext& context) {
@@ -208,7 +180,7 @@ Result<int> run_import(ImportOptions& options, CliContext& context) {
   }
   if (options.format == kRuns) return import_runs(options, context);
   const bool to_stdout = options.out == "-";
-  ASSIGN_OR_RETURN(const TrialLog log, read_logs(options));
+  ASSIGN_OR_RETURN(const TrialLog log, read_bbautotune(options));
   show_notes(log, console);
   if (to_stdout && console.json()) {
     return Error{"--json and --out - both want standard output; name a file"};
@@ -245,7 +217,8 @@ SubcommandRun setup_import(CLI::App& app) {
                  "bbautotune: its trials; runs: drives of a ground robot as a table (separated by "
                  "commas, semicolons or tabs), TUM, Motive, rostopic or ros2 topic echo, "
                  "PlotJuggler, .bag, .db3 or .mcap")
-      ->required();
+      ->required()
+      ->check(CLI::IsMember({kBbautotune, kRuns}));
   app.add_option("FILES", options->files, "Logs; each becomes a session or a run")->required();
   app.add_option("-o,--out", options->out,
                  "Trial log to write, - for standard output; of runs: a folder");
