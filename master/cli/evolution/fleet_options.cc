@@ -69,6 +69,7 @@ void FleetChoice::declare(CLI::App& app, const std::string& with) {
                         ->type_name("SYSTEM");
   if (alone) on->required();
   if (!alone) app.option_defaults()->group("");
+  const std::size_t others = static_cast<const CLI::App&>(app).get_options().size();
   app.add_option("--min", min_workers, "Workers to keep also when there is little to do");
   app.add_option("--max", max_workers, "Workers at most")->check(CLI::Range(1, 1000000));
   app.add_option("--site", site, "A site's own file in place of configs/sites/SYSTEM.toml")
@@ -97,27 +98,20 @@ void FleetChoice::declare(CLI::App& app, const std::string& with) {
   app.add_option("--worker-logs", logs, "Folder of the jobs' output, which all nodes see")
       ->type_name("FOLDER");
   app.option_defaults()->group("Options");
+  options_ = static_cast<const CLI::App&>(app).get_options();
+  options_.erase(options_.begin(), options_.begin() + static_cast<std::ptrdiff_t>(others));
 }
 
-std::vector<std::string> FleetChoice::arguments() const {
-  std::vector<std::string> all = {
-      "--on", system, "--min", std::to_string(min_workers), "--max", std::to_string(max_workers)};
-  const auto add = [&](const char* name, const std::string& value) {
-    if (!value.empty()) all.insert(all.end(), {name, value});
-  };
-  add("--site", site);
-  add("--workers-per-job", std::to_string(workers_per_job));
-  add("--wall-time", wall_time);
-  add("--idle", std::to_string(idle_s));
-  if (look_interval_s > 0) add("--look-every", std::to_string(look_interval_s));
-  for (const std::string& host : hosts) add("--host", host);
-  add("--ssh-config", ssh_config);
-  add("--worker-program", worker);
-  add("--worker-keys", worker_keys);
-  add("--worker-logs", logs);
-  if (allow_external) all.push_back("--allow-external");
-  if (block > 0) add("--block", std::to_string(block));
-  for (const std::string& option : extra) all.push_back("--with=" + option);
+std::vector<std::string> FleetChoice::arguments(const std::string& with) const {
+  std::vector<std::string> all = {with, system};
+  for (const CLI::Option* option : options_) {
+    const bool flag = option->get_items_expected_max() == 0;
+    if (flag && option->count() > 0) all.push_back(option->get_name());
+    // The value may begin as an option does.
+    for (const std::string& value : option->results()) {
+      if (!flag) all.push_back(option->get_name() + "=" + value);
+    }
+  }
   return all;
 }
 
@@ -213,7 +207,7 @@ Result<std::unique_ptr<OwnedChild>> start_workers_beside(const FleetChoice& choi
     setup.arguments.push_back("--insecure");
   else
     setup.arguments.insert(setup.arguments.end(), {"--keys", keys});
-  const auto fleet = choice.arguments();
+  const auto fleet = choice.arguments("--on");
   setup.arguments.insert(setup.arguments.end(), fleet.begin(), fleet.end());
   setup.death_signal = SIGTERM;
   setup.leads_group = true;  // Ctrl-C is for the command, which ends this when it is done

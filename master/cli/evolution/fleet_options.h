@@ -31,11 +31,14 @@ struct FleetChoice {
 
   // `with`: "--on", or "--workers-on" of commands that do it beside their work.
   void declare(CLI::App& app, const std::string& with);
-  // The options again, for a command line.
-  std::vector<std::string> arguments() const;
+  // Those that were given again, for a command line that has `with`.
+  std::vector<std::string> arguments(const std::string& with) const;
   Result<ClusterSite> read_site() const;
   // Errors: no --max, a wall time that is none, a site that cannot be read.
   Status check() const;
+
+ private:
+  std::vector<const CLI::Option*> options_;  // but for the system's, of an app that outlives this
 };
 
 // "90", "1:30:00" or "2-00:00:00", in seconds.

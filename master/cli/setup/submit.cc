@@ -91,8 +91,7 @@ Result<int> run_submit(SubmitCommand command, CliContext& context) {
     farm.insert(farm.end(), {"--insecure", "--insecure-anywhere"});
   else
     farm.insert(farm.end(), {"--keys", std::filesystem::absolute(command.keys).string()});
-  std::vector<std::string> fleet = command.fleet.arguments();
-  fleet.front() = "--workers-on";
+  const std::vector<std::string> fleet = command.fleet.arguments("--workers-on");
   farm.insert(farm.end(), fleet.begin(), fleet.end());
   std::vector<std::string> evolve = {self}, resume = {self, "resume", run};
   evolve.insert(evolve.end(), command.evolve.begin(), command.evolve.end());
