@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <set>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -60,20 +59,6 @@ constexpr Text kTexts[] = {
      "float32 acceleration\nfloat32 jerk\n"},
     {"ackermann_msgs/AckermannDriveStamped",
      "std_msgs/Header header\nackermann_msgs/AckermannDrive drive\n"}};
-
-const Text* find(std::string_view type) { return find_by(kTexts, type, &Text::type); }
-
-// The types that a field has, once each, behind the types that hold them.
-void collect(const Text& text, std::set<std::string_view>& done, std::string& out) {
-  for (std::string_view rest = text.fields; !rest.empty();
-       rest.remove_prefix(rest.find('\n') + 1)) {
-    const std::string_view word = rest.substr(0, rest.find_first_of(" ["));
-    const Text* inner = find(word);
-    if (inner == nullptr || !done.insert(word).second) continue;
-    out += std::string("================\nMSG: ") + inner->type + "\n" + inner->fields;
-    collect(*inner, done, out);
-  }
-}
 
 }  // namespace
 
@@ -200,8 +185,13 @@ Result<MessageSchema> MessageSchema::parse(const std::string& type, std::string_
 }
 
 Result<MessageSchema> MessageSchema::known(const std::string& type) {
-  const std::string text = message_text(short_type(type));
-  if (text.empty()) return Error{"no definition of " + quoted_word(type) + " is known"};
+  const Text* own = find_by(kTexts, short_type(type), &Text::type);
+  if (own == nullptr) return Error{"no definition of " + quoted_word(type) + " is known"};
+  // With all that it might hold.
+  std::string text = own->fields;
+  for (const Text& other : kTexts) {
+    if (&other != own) text += std::string("MSG: ") + other.type + "\n" + other.fields;
+  }
   return parse(type, text);
 }
 
@@ -337,15 +327,6 @@ class MessageDecoder {
 
 Result<MessageContent> MessageSchema::decode(std::string_view bytes, MessageWire wire) const {
   return MessageDecoder(*this, bytes, wire).run();
-}
-
-std::string message_text(const std::string& type) {
-  const Text* text = find(type);
-  if (text == nullptr) return {};
-  std::string out = text->fields;
-  std::set<std::string_view> done;
-  collect(*text, done, out);
-  return out;
 }
 
 }  // namespace gapfarm

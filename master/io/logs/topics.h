@@ -58,9 +58,6 @@ std::string short_type(std::string_view type);
 // Whether robots that drive need this type.
 bool serves_ground_robots(std::string_view type);
 
-// The type's definition with those of the types within, ROS 2's fields; empty for other types.
-std::string message_text(const std::string& type);
-
 // What a bag says of a topic.
 struct BagTopic {
   std::string name, type;
