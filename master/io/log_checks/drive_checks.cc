@@ -19,15 +19,6 @@ constexpr double kStillTurn_rad = 0.02;
 constexpr double kTolerance = 1.1;   // of the bounds
 constexpr double kUnslipped = 1.05;  // of the fastest turn
 
-double concentration(const std::vector<DriveSample>& samples, double factor) {
-  std::complex<double> sum = 0;
-  for (const DriveSample& s : samples) {
-    const double travel = s.travel_rad() + (s.forward_s < 0 ? std::numbers::pi : 0);
-    sum += std::polar(1.0, travel - factor * s.mid_heading_rad());
-  }
-  return std::abs(sum) / static_cast<double>(samples.size());
-}
-
 constexpr double kStraight = 0.2;  // turn over way, of what counts as straight
 constexpr double kGentle = 0.9;    // and of arcs that end before they have turned round
 
@@ -88,6 +79,67 @@ Rate best_rate(const std::vector<DriveSample>& turns, double sign) {
     if (value > best.agreement) best = {rate, value};
   }
   return best;
+}
+
+// Which way headings change when the right side is commanded to run faster: +1 counter-clockwise,
+// as it should be, -1 clockwise; 0 where the log does not say, so also where turns by 200 degrees
+// one way cannot be distinguished from 160 the other.
+int sense_of_turns(const std::vector<DriveSample>& samples) {
+  std::vector<DriveSample> turns;
+  for (const DriveSample& s : samples) {
+    if (std::abs(s.turn_s) > 1e-9) turns.push_back(s);
+  }
+  if (turns.size() < kFewestTurns) return 0;
+  const Rate ccw = best_rate(turns, 1), cw = best_rate(turns, -1);
+  // It must explain most of what no turning at all leaves; where turns are small that is little.
+  const double still = agreement(turns, 0);
+  const auto explains = [still](const Rate& rate) {
+    return rate.agreement >= kGoodConcentration && 1 - rate.agreement < 0.5 * (1 - still);
+  };
+  const bool left = explains(ccw), right = explains(cw);
+  if (!left || !right) return left ? 1 : right ? -1 : 0;
+  if (std::abs(ccw.agreement - cw.agreement) > 0.15) return ccw.agreement > cw.agreement ? 1 : -1;
+  // A turn of one angle, or of that less a full one the other way: the shorter is meant where it is
+  // much the shorter.
+  if (ccw.rate < 0.6 * cw.rate) return 1;
+  return cw.rate < 0.6 * ccw.rate ? -1 : 0;
+}
+
+// Mean direction of travel less `factor` times the heading; its length is their concentration.
+std::complex<double> mean_travel(const std::vector<DriveSample>& samples, double factor) {
+  std::complex<double> sum = 0;
+  for (const DriveSample& s : samples) {
+    const double travel = s.travel_rad() + (s.forward_s < 0 ? kPi : 0);
+    sum += std::polar(1.0, travel - factor * s.mid_heading_rad());
+  }
+  return sum / static_cast<double>(samples.size());
+}
+
+// How the direction of travel follows the heading, over drives that go straight: travel = heading +
+// offset where positions and headings have the same sense, travel = -heading + offset where one of
+// them is mirrored.
+struct TravelFit {
+  double same = 0;      // concentration in [0, 1] of travel - heading
+  double mirrored = 0;  // of travel + heading
+  double offset_rad = 0;
+  std::size_t drives = 0;
+
+  bool is_clear() const {  // one of them is clearly the better one, and good
+    return drives >= kFewestStraight && std::max(same, mirrored) > kGoodConcentration &&
+           std::abs(same - mirrored) > kClearMargin;
+  }
+};
+
+TravelFit fit_travel(const std::vector<DriveSample>& samples) {
+  std::vector<DriveSample> straight = straight_samples(samples);
+  if (straight.size() < kFewestStraight) return {};
+  const double typical = median(mapped(straight, &DriveSample::distance_m));
+  std::erase_if(straight,
+                [&](const DriveSample& s) { return !(s.distance_m() > kLeastShare * typical); });
+  if (straight.empty()) return {};
+  const auto same = mean_travel(straight, 1), mirrored = mean_travel(straight, -1);
+  const bool follows = std::abs(same) >= std::abs(mirrored);
+  return {std::abs(same), std::abs(mirrored), std::arg(follows ? same : mirrored), straight.size()};
 }
 
 std::string evidence(const TravelFit& travel, int sense) {
@@ -163,6 +215,20 @@ std::optional<SanityFinding> turned_finding(const TravelFit& travel, int sense,
                            " to theta0 and theta1, or turn x and y back by as much."};
 }
 
+std::optional<SanityFinding> finding_of(const TravelFit& travel, int sense) {
+  const std::string seen = evidence(travel, sense);
+  if (travel.is_clear()) {
+    if (travel.mirrored > travel.same) return mirrored_finding(travel, sense, seen);
+    return turned_finding(travel, sense, seen);
+  }
+  if (sense >= 0) return std::nullopt;
+  return SanityFinding{"sides_swapped",
+                       seen +
+                           " So left and right are exchanged, or headings count clockwise; without "
+                           "straight drives the log does not say which.",
+                       "Exchange left and right, or change the sign of theta."};
+}
+
 }  // namespace
 
 bool check_motion(const std::vector<DriveSample>& samples, const DriveLimits& limits,
@@ -226,8 +292,8 @@ bool check_heading_unit(const std::vector<DriveSample>& samples,
   const std::vector<double> sizes =
       mapped(straight, [](const DriveSample& s) { return std::abs(s.X_WS.theta); });
   if (quantile(sizes, 0.95) > kSmall_rad) return false;
-  const double as_logged = concentration(straight, 1);
-  const double scaled = concentration(straight, 1 / kDegree);
+  const double as_logged = std::abs(mean_travel(straight, 1));
+  const double scaled = std::abs(mean_travel(straight, 1 / kDegree));
   if (as_logged > kBad || scaled < kGood) return false;
   findings->push_back(
       {"unit_error",
@@ -318,70 +384,6 @@ double full_speed_of(const std::vector<DriveSample>& samples) {
   }
   return speeds.empty() ? 0 : median(speeds);
 }
-
-bool TravelFit::is_clear() const {
-  return drives >= kFewestStraight && std::max(same, mirrored) > kGoodConcentration &&
-         std::abs(same - mirrored) > kClearMargin;
-}
-
-TravelFit fit_travel(const std::vector<DriveSample>& samples) {
-  const std::vector<DriveSample> straight = straight_samples(samples);
-  TravelFit fit;
-  if (straight.size() < kFewestStraight) return fit;
-  const double typical = median(mapped(straight, &DriveSample::distance_m));
-  std::complex<double> same = 0, mirrored = 0;
-  for (const DriveSample& s : straight) {
-    if (!(s.distance_m() > kLeastShare * typical)) continue;
-    const double travel = s.travel_rad() + (s.forward_s < 0 ? kPi : 0);
-    same += std::polar(1.0, travel - s.mid_heading_rad());
-    mirrored += std::polar(1.0, travel + s.mid_heading_rad());
-    ++fit.drives;
-  }
-  if (fit.drives == 0) return fit;
-  fit.same = std::abs(same) / static_cast<double>(fit.drives);
-  fit.mirrored = std::abs(mirrored) / static_cast<double>(fit.drives);
-  fit.offset_rad = std::arg(fit.same >= fit.mirrored ? same : mirrored);
-  return fit;
-}
-
-int sense_of_turns(const std::vector<DriveSample>& samples) {
-  std::vector<DriveSample> turns;
-  for (const DriveSample& s : samples) {
-    if (std::abs(s.turn_s) > 1e-9) turns.push_back(s);
-  }
-  if (turns.size() < kFewestTurns) return 0;
-  const Rate ccw = best_rate(turns, 1), cw = best_rate(turns, -1);
-  // It must explain most of what no turning at all leaves; where turns are small that is little.
-  const double still = agreement(turns, 0);
-  const auto explains = [still](const Rate& rate) {
-    return rate.agreement >= kGoodConcentration && 1 - rate.agreement < 0.5 * (1 - still);
-  };
-  const bool left = explains(ccw), right = explains(cw);
-  if (!left || !right) return left ? 1 : right ? -1 : 0;
-  if (std::abs(ccw.agreement - cw.agreement) > 0.15) return ccw.agreement > cw.agreement ? 1 : -1;
-  // A turn of one angle, or of that less a full one the other way: the shorter is meant where it is
-  // much the shorter.
-  if (ccw.rate < 0.6 * cw.rate) return 1;
-  return cw.rate < 0.6 * ccw.rate ? -1 : 0;
-}
-
-namespace {
-
-std::optional<SanityFinding> finding_of(const TravelFit& travel, int sense) {
-  const std::string seen = evidence(travel, sense);
-  if (travel.is_clear()) {
-    if (travel.mirrored > travel.same) return mirrored_finding(travel, sense, seen);
-    return turned_finding(travel, sense, seen);
-  }
-  if (sense >= 0) return std::nullopt;
-  return SanityFinding{"sides_swapped",
-                       seen +
-                           " So left and right are exchanged, or headings count clockwise; without "
-                           "straight drives the log does not say which.",
-                       "Exchange left and right, or change the sign of theta."};
-}
-
-}  // namespace
 
 std::optional<SanityFinding> check_axes(const std::vector<DriveSample>& samples) {
   auto finding = finding_of(fit_travel(samples), sense_of_turns(samples));
