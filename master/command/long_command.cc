@@ -52,13 +52,14 @@ std::string state_folder() {
   return {};
 }
 
-}  // namespace
-
+// What a command that ended so is, for status and --on-end: "finished", "stopped" or "failed".
 std::string state_of_exit(int exit_code) {
   if (exit_code == kExitDone || exit_code == kExitQuarantined) return "finished";
   if (exit_code == kExitResumable || exit_code > kExitSignalBase) return "stopped";
   return "failed";
 }
+
+}  // namespace
 
 std::string command_line() {
   std::string text = "gapfarm";

@@ -21,9 +21,6 @@ namespace gapfarm {
 // What this process was called with: "gapfarm diagnose ...".
 std::string command_line();
 
-// What a command that ended so is, for status and --on-end: "finished", "stopped" or "failed".
-std::string state_of_exit(int exit_code);
-
 struct KeepingPlace {
   std::filesystem::path folder;
   bool passing = false;  // made for this purpose only: goes when the command ends well

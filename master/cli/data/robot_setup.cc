@@ -55,19 +55,9 @@ std::string robot_beside(const std::string& out) {
   return (path.parent_path() / (path.stem().string() + "_robot.toml")).string();
 }
 
-RobotSetup setup_of_arguments(const std::vector<std::string>& arguments, const std::string& out) {
-  RobotSetup setup;
-  std::error_code ignored;
-  for (const std::string& word : arguments) {
-    (fs::is_directory(word, ignored) ? setup.runs : setup.files).push_back(word);
-  }
-  setup.robot = robot_beside(out);
-  setup.config = out;
-  return setup;
-}
-
-}  // namespace
-
+// A robot out of the files that its user has: URDFs, robot.tomls, and controller files among them
+// (.yaml, .yml) or in `controllers`: the first robot; what others say differently is added to its
+// disagreements.  Errors name the file.
 Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
                                       std::vector<std::string> controllers) {
   std::vector<std::string> robots;
@@ -90,6 +80,19 @@ Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
   }
   return *std::move(first);
 }
+
+RobotSetup setup_of_arguments(const std::vector<std::string>& arguments, const std::string& out) {
+  RobotSetup setup;
+  std::error_code ignored;
+  for (const std::string& word : arguments) {
+    (fs::is_directory(word, ignored) ? setup.runs : setup.files).push_back(word);
+  }
+  setup.robot = robot_beside(out);
+  setup.config = out;
+  return setup;
+}
+
+}  // namespace
 
 Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
   ASSIGN_OR_RETURN(RobotReading reading, read_robot_files(setup.files, setup.controllers));

@@ -13,10 +13,11 @@
 namespace gapfarm {
 
 struct RobotSetup {
-  std::vector<std::string> files, controllers;  // as read_robot_files() takes them
-  std::string robot;                            // robot.toml to write; empty: none
-  std::string config;                           // to write; empty: none; "-": text alone
-  std::vector<std::string> runs;                // folders that the config names
+  std::vector<std::string> files,
+      controllers;                // URDFs and robot.tomls; .yaml of either is a controller's
+  std::string robot;              // robot.toml to write; empty: none
+  std::string config;             // to write; empty: none; "-": text alone
+  std::vector<std::string> runs;  // folders that the config names
 };
 
 struct RobotTexts {
@@ -44,11 +45,5 @@ Result<int> run_init_robot(const std::vector<std::string>& arguments, const std:
 // Says where a config went and what it is of; for `out` "-" shows its text.
 void show_config(const std::string& out, const std::string& of, const std::string& text, Json json,
                  Console& console);
-
-// A robot out of the files that its user has: URDFs, robot.tomls, and controller files among them
-// (.yaml, .yml) or in `controllers`: the first robot; what others say differently is added to its
-// disagreements.  Errors name the file.
-Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
-                                      std::vector<std::string> controllers);
 
 }  // namespace gapfarm

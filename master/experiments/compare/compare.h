@@ -107,10 +107,6 @@ ComparisonSummary summarise_comparison(std::span<const Variant> variants,
                                        const std::vector<ComparedRun>& runs,
                                        const CompareOptions& options, std::optional<double> target);
 
-// Evaluations at which a run first was at least as good as `target`.
-std::optional<std::uint64_t> evaluations_to(const ComparedRun& run, double target,
-                                            bool higher_is_better);
-
 // A line a variant and baseline, for people.
 std::string comparison_text(const ComparisonSummary& summary);
 

@@ -56,6 +56,17 @@ ConvergencePoint point_of(const std::vector<double>& costs, std::uint64_t evalua
   return point;
 }
 
+// Evaluations at which a run first was at least as good as `target`.
+std::optional<std::uint64_t> evaluations_to(const ComparedRun& run, double target,
+                                            bool higher_is_better) {
+  for (const Improvement& improvement : run.improvements) {
+    if (higher_is_better ? improvement.fitness >= target : improvement.fitness <= target) {
+      return improvement.evaluations;
+    }
+  }
+  return std::nullopt;
+}
+
 void add_target(const std::vector<const ComparedRun*>& runs, double target, bool higher,
                 VariantSummary* to) {
   std::vector<double> needed;
@@ -184,16 +195,6 @@ std::string number(double value) { return std::isfinite(value) ? fmt::format("{}
 std::string number(const std::optional<double>& value) { return value ? number(*value) : ""; }
 
 }  // namespace
-
-std::optional<std::uint64_t> evaluations_to(const ComparedRun& run, double target,
-                                            bool higher_is_better) {
-  for (const Improvement& improvement : run.improvements) {
-    if (higher_is_better ? improvement.fitness >= target : improvement.fitness <= target) {
-      return improvement.evaluations;
-    }
-  }
-  return std::nullopt;
-}
 
 ComparisonSummary summarise_comparison(std::span<const Variant> variants,
                                        const std::vector<ComparedRun>& runs,

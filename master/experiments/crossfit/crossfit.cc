@@ -90,6 +90,33 @@ Result<std::vector<Part>> parts_of(const Problem& problem, const CrossfitPlan& p
   return parts;
 }
 
+// Mean corner distance where the trial's command is a piece, else the distance of the positions, m.
+double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE) {
+  if (problem.pieces.empty()) return std::hypot(X_WE.x - trial.X_WE.x, X_WE.y - trial.X_WE.y);
+  return corner_distance(problem.piece(trial.command), X_WE, trial.X_WE);
+}
+
+// One end a trial.
+EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
+                     std::span<const Pose> ends) {
+  EndErrors errors;
+  if (trials.empty()) return errors;
+  std::vector<double> whole, position, heading;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    whole.push_back(end_error(problem, trials[i], ends[i]));
+    const Pose& X = trials[i].X_WE;
+    position.push_back(std::hypot(ends[i].x - X.x, ends[i].y - X.y));
+    heading.push_back(std::abs(wrap_angle(ends[i].theta - X.theta)));
+    errors.mean_m += whole.back();
+  }
+  errors.trials = trials.size();
+  errors.mean_m /= static_cast<double>(trials.size());
+  errors.median_m = median(whole);
+  errors.median_position_m = median(position);
+  errors.median_heading_rad = median(heading);
+  return errors;
+}
+
 class Crossfit {
  public:
   Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
@@ -244,31 +271,6 @@ ScoreCandidates scores_by(Farm& farm, const Problem& problem, std::uint64_t seed
 }
 
 }  // namespace
-
-double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE) {
-  if (problem.pieces.empty()) return std::hypot(X_WE.x - trial.X_WE.x, X_WE.y - trial.X_WE.y);
-  return corner_distance(problem.piece(trial.command), X_WE, trial.X_WE);
-}
-
-EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
-                     std::span<const Pose> ends) {
-  EndErrors errors;
-  if (trials.empty()) return errors;
-  std::vector<double> whole, position, heading;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    whole.push_back(end_error(problem, trials[i], ends[i]));
-    const Pose& X = trials[i].X_WE;
-    position.push_back(std::hypot(ends[i].x - X.x, ends[i].y - X.y));
-    heading.push_back(std::abs(wrap_angle(ends[i].theta - X.theta)));
-    errors.mean_m += whole.back();
-  }
-  errors.trials = trials.size();
-  errors.mean_m /= static_cast<double>(trials.size());
-  errors.median_m = median(whole);
-  errors.median_position_m = median(position);
-  errors.median_heading_rad = median(heading);
-  return errors;
-}
 
 Status check_crossfit(const Problem& problem, const CrossfitPlan& plan) {
   if (const auto parts = parts_of(problem, plan); !parts) return parts.error();

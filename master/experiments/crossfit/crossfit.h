@@ -42,18 +42,11 @@ Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,
 // Distances between where trials ended and where they were predicted to end.
 struct EndErrors {
   std::size_t trials = 0;
-  double mean_m = 0;  // of end_error()
+  double mean_m = 0;  // of a piece's corners, else of the positions
   double median_m = 0;
   double median_position_m = 0;
   double median_heading_rad = 0;
 };
-
-// Mean corner distance where the trial's command is a piece, else the distance of the positions, m.
-double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE);
-
-// One end a trial.
-EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
-                     std::span<const Pose> ends);
 
 struct CrossfitPlan {
   std::vector<std::string> train;               // filters of select_trials(), all of which hold

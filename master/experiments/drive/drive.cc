@@ -30,6 +30,14 @@ Trial planned_leg(const CommandSpec& command, std::size_t index, double t_s, con
   return trial;
 }
 
+// Moves a path along the world's axes, m.
+void move_path(double dx_m, double dy_m, std::vector<PathSample>* path) {
+  for (PathSample& sample : *path) {
+    sample.pose.x += dx_m;
+    sample.pose.y += dy_m;
+  }
+}
+
 CommandSpec lasting(const ConstantVelocity& model, double seconds) {
   CommandSpec command = model.command;
   command.duration_s = std::clamp(seconds, kShortest_s, kLongest_s);
@@ -201,13 +209,6 @@ class SimulatedMover final : public Mover {
 };
 
 }  // namespace
-
-void move_path(double dx_m, double dy_m, std::vector<PathSample>* path) {
-  for (PathSample& sample : *path) {
-    sample.pose.x += dx_m;
-    sample.pose.y += dy_m;
-  }
-}
 
 Result<std::vector<ConstantVelocity>> nominal_velocities(Farm& farm, const Problem& problem) {
   std::vector<v1::Task> tasks;

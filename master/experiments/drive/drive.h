@@ -23,9 +23,6 @@ struct Leg {
 };
 using DrivenRun = std::vector<Leg>;
 
-// Moves a path along the world's axes, m.
-void move_path(double dx_m, double dy_m, std::vector<PathSample>* path);
-
 // Drives one command in every run, each from where it stands.
 class Mover {
  public:

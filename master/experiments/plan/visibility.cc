@@ -111,13 +111,14 @@ std::map<std::size_t, std::vector<const Shift*>> by_effect(const Signals& signal
   return found;
 }
 
-double threshold_of(const Problem& problem, std::size_t effect) {
-  return 2 * gain_to_be_named(*diagnosis_subject(problem),
-                              problem.table().effects()[effect].parameters.size());
-}
-
 double freedom_of(const Problem& problem, std::size_t effect) {
   return static_cast<double>(problem.table().effects()[effect].parameters.size());
+}
+
+// Twice the nats that an effect must gain to be named: the diagnosis's threshold and what as many
+// parameters gain by luck.
+double threshold_of(const Problem& problem, std::size_t effect) {
+  return 2 * diagnosis_subject(problem)->least_gain + freedom_of(problem, effect);
 }
 
 void find_like(const ParameterTable& table, const Signals& signals,
@@ -182,10 +183,6 @@ Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
   }
   RETURN_IF_ERROR(simulate_shifts(predictor, study, &found.shifts));
   return found;
-}
-
-double gain_to_be_named(const DiagnosisSubject& subject, std::size_t parameters) {
-  return subject.least_gain + 0.5 * static_cast<double>(parameters);
 }
 
 std::vector<Visibility> visibility(const Problem& problem, const Signals& signals) {

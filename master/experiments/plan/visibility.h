@@ -83,10 +83,6 @@ struct SignalSettings {
 Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
                         const SignalSettings& settings);
 
-// Nats that an effect with so many parameters must gain to be named: the diagnosis's threshold and
-// what as many parameters gain by luck.
-double gain_to_be_named(const DiagnosisSubject& subject, std::size_t parameters);
-
 struct Visibility {
   std::string effect;
   std::string parameter;  // its first strength's key in the table

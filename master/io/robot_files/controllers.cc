@@ -88,27 +88,8 @@ constexpr TypeWord kTypes[] = {
     {"diff", "differential"},   {"libgazebo_ros_create", "differential"},
 };
 
-}  // namespace
-
-const StatedNumber* DriveFacts::number(const std::string& wanted) const {
-  const auto found = numbers.find(wanted);
-  return found == numbers.end() ? nullptr : &found->second;
-}
-
-std::vector<std::string> DriveFacts::joints_of(const std::vector<std::string>& roles) const {
-  std::vector<std::string> all;
-  for (const std::string& role : roles) {
-    const auto found = joints.find(role);
-    if (found == joints.end()) continue;
-    for (const std::string& joint : found->second.names) {
-      if (!contains(all, joint)) all.push_back(joint);
-    }
-  }
-  return all;
-}
-
-std::string DriveFacts::place(int at_line) const { return file + ":" + std::to_string(at_line); }
-
+// Puts one "key = value" (keys of maps joined by dots, a list as several values) where it belongs.
+// False when no table knows the key.
 bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::string>& values,
                int line) {
   for (const NumberKeys& row : kNumbers) {
@@ -133,6 +114,7 @@ bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::s
   return false;
 }
 
+// The drive that a controller's or plugin's type names; empty when none.
 std::string drive_of_type(std::string_view type) {
   const std::string lower = lowered(std::string(type));
   for (const TypeWord& row : kTypes) {
@@ -140,6 +122,27 @@ std::string drive_of_type(std::string_view type) {
   }
   return {};
 }
+
+}  // namespace
+
+const StatedNumber* DriveFacts::number(const std::string& wanted) const {
+  const auto found = numbers.find(wanted);
+  return found == numbers.end() ? nullptr : &found->second;
+}
+
+std::vector<std::string> DriveFacts::joints_of(const std::vector<std::string>& roles) const {
+  std::vector<std::string> all;
+  for (const std::string& role : roles) {
+    const auto found = joints.find(role);
+    if (found == joints.end()) continue;
+    for (const std::string& joint : found->second.names) {
+      if (!contains(all, joint)) all.push_back(joint);
+    }
+  }
+  return all;
+}
+
+std::string DriveFacts::place(int at_line) const { return file + ":" + std::to_string(at_line); }
 
 std::vector<DriveFacts> plugin_facts(const UrdfModel& model) {
   std::vector<DriveFacts> all;

@@ -47,14 +47,6 @@ struct DriveFacts {
   std::string place(int at_line) const;
 };
 
-// Puts one "key = value" (keys of maps joined by dots, a list as several values) where it belongs.
-// False when no table knows the key.
-bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::string>& values,
-               int line);
-
-// The drive that a controller's or plugin's type names; empty when none.
-std::string drive_of_type(std::string_view type);
-
 // The plugins of `model` that drive it.
 std::vector<DriveFacts> plugin_facts(const UrdfModel& model);
 

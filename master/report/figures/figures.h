@@ -39,9 +39,6 @@ struct LineChart {
   std::vector<ChartLevel> levels;
 };
 
-// The colour of the i-th series: Okabe and Ito's, then the same dashed.
-std::string series_colour(std::size_t i);
-
 std::string line_chart(const LineChart& chart);
 // Several as one picture, so many in a row.
 std::string line_charts(const std::vector<LineChart>& charts, std::size_t across);

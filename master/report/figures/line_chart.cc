@@ -126,6 +126,9 @@ void draw_axes(Svg& svg, const Frame& frame, const LineChart& chart) {
   svg.text({18, kPlotY + frame.height / 2}, chart.y_title, upright);
 }
 
+// The colour of the i-th series: Okabe and Ito's, then the same dashed.
+std::string series_colour(std::size_t i) { return kColours[i % kColours.size()]; }
+
 SvgStyle stroke_of(std::size_t i, double width) {
   return {
       .stroke = series_colour(i), .stroke_width = width, .dash = i < kColours.size() ? "" : "7 4"};
@@ -206,8 +209,6 @@ void draw_chart(Svg& svg, const LineChart& chart) {
 }
 
 }  // namespace
-
-std::string series_colour(std::size_t i) { return kColours[i % kColours.size()]; }
 
 std::string line_charts(const std::vector<LineChart>& charts, std::size_t across) {
   const double height = charts.empty() ? 0 : std::ranges::max(mapped(charts, height_of));

@@ -29,8 +29,6 @@ const char* without_best(const RunReport& report) {
                                                            : "No individual has a fitness yet.";
 }
 
-}  // namespace
-
 std::string front_section(const RunReport& report) {
   if (report.front.members.empty()) return "";
   return fmt::format(
@@ -40,6 +38,7 @@ std::string front_section(const RunReport& report) {
          plot_grid("front") + "</section>\n";
 }
 
+// Importance of the genes, and the fitness over two of them.
 std::string understanding_section(const RunReport& report) {
   if (report.sample.evaluated.size() < 2) return "";
   std::string html =
@@ -100,8 +99,6 @@ Json sample_json(const RunReport& report) {
   }
   return {{"genes", std::move(genes)}, {"evaluated", std::move(evaluated)}};
 }
-
-namespace {
 
 constexpr int kVersion = 1;
 

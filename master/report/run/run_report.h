@@ -206,9 +206,6 @@ std::string state_line(const RunFarm& farm);
 std::string operators_section(const RunReport& report);
 std::string densities_section(const RunReport& report);
 std::string elite_section(const RunReport& report);
-std::string front_section(const RunReport& report);
-// Importance of the genes, and the fitness over two of them.
-std::string understanding_section(const RunReport& report);
 std::string genomes_section(const RunReport& report);
 std::string farm_section(const RunFarm& farm);
 
@@ -217,8 +214,6 @@ Json generations_json(const RunReport& report);
 Json operators_json(const RunReport& report);
 Json densities_json(const RunReport& report);
 Json elite_json(const RunReport& report);
-Json front_json(const RunReport& report);
-Json sample_json(const RunReport& report);
 Json timeline_json(const RunFarm& farm);
 
 }  // namespace gapfarm
