@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/text.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
@@ -162,6 +163,10 @@ constexpr const char* kRuns = "runs";
 constexpr const char* kBbautotune = "bbautotune";  // its robot is an SRV-1
 
 Result<TrialLog> read_bbautotune(const ImportOptions& options) {
+  if (options.format != kBbautotune) {
+    const std::vector<std::string> known = {kBbautotune, kRuns};
+    return Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)};
+  }
   for (const std::string& file : options.files) {
     ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
     const TextFormat found = sniff_format(text);
@@ -217,8 +222,7 @@ SubcommandRun setup_import(CLI::App& app) {
                  "bbautotune: its trials; runs: drives of a ground robot as a table (separated by "
                  "commas, semicolons or tabs), TUM, Motive, rostopic or ros2 topic echo, "
                  "PlotJuggler, .bag, .db3 or .mcap")
-      ->required()
-      ->check(CLI::IsMember({kBbautotune, kRuns}));
+      ->required();
   app.add_option("FILES", options->files, "Logs; each becomes a session or a run")->required();
   app.add_option("-o,--out", options->out,
                  "Trial log to write, - for standard output; of runs: a folder");

@@ -65,6 +65,7 @@ const std::vector<OptionChoices>& option_choices() {
       {"--genome", {"best"}},
       {"--log-format", {"text", "json"}},
       {"--log-level", {"debug", "info", "warn", "error", "off"}},
+      {"FORMAT", {"bbautotune", "runs"}},
       {"--sizes", {"clear", "subtle"}},
       {"--on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
       {"--workers-on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
