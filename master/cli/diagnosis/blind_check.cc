@@ -34,7 +34,7 @@ struct BlindCheckOptions {
 
 Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
   DesignSettings design = options.design;
-  RETURN_IF_ERROR(check_effects(config.problem.table(), design.effects));
+  RETURN_IF_ERROR(effects_named(config.problem.table(), design.effects));
   for (const std::string& word : options.sizes) {
     ASSIGN_OR_RETURN(const SizeLevel level, size_level(word));
     design.sizes.push_back(level);

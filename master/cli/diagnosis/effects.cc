@@ -13,6 +13,7 @@
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
+#include "master/experiments/blind_check/cases/sizing.h"
 #include "master/farm/planned_trials.h"
 #include "master/report/figures/figures.h"
 
@@ -194,14 +195,8 @@ Result<Config> figure_config(const EffectsOptions& options) {
   return config;
 }
 
-// Their places in the table; a second one of a kind does what the first does.
-std::vector<std::size_t> pictured(const ParameterTable& table) {
-  std::vector<std::size_t> firsts;
-  for (std::size_t e = 0; e < table.effects().size(); ++e) {
-    if (table.effects()[e].repeats.empty()) firsts.push_back(e);
-  }
-  return firsts;
-}
+// A second one of a kind does what the first does.
+std::vector<std::size_t> pictured(const ParameterTable& table) { return *effects_named(table); }
 
 // Pairs of tasks: every effect's drives without it and with it.
 std::vector<v1::Task> figure_tasks(const Problem& problem) {

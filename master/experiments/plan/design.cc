@@ -48,150 +48,6 @@ Sessions dealt(const std::vector<Chain>& chains, unsigned sessions, double pause
   return plan;
 }
 
-class Designer {
- public:
-  Designer(Farm& farm, const Config& config, const PlanSettings& settings)
-      : farm_(farm),
-        config_(config),
-        settings_(settings),
-        subject_(diagnosis_subject(config.problem)) {}
-
-  Status choose_effects(DesignedPlan* plan);
-  Sessions draw(unsigned times, std::uint64_t seed) const;
-  // Where the model stops, without any noise.
-  Result<TrialLog> driven(const Sessions& plan);
-  Result<Signals> signals_of(const TrialLog& log) {
-    return signals(farm_, config_.problem, log, {effects_, settings_.seed});
-  }
-  Result<std::vector<Chain>> choose(double* best_share);
-  // Whether all of these trials end within the arena.
-  bool stays(const TrialLog& log, std::size_t first, std::size_t count) const;
-  unsigned chain() const { return std::max(1U, config_.simulate.chain); }
-  std::vector<PowerPoint> power(const Signals& planned, const TrialLog& planned_log,
-                                const Signals& random, const TrialLog& random_log,
-                                const std::vector<Visibility>& at) const;
-  const std::vector<std::size_t>& effects() const { return effects_; }
-
- private:
-  Farm& farm_;
-  const Config& config_;
-  const PlanSettings& settings_;
-  std::shared_ptr<const DiagnosisSubject> subject_;
-  std::vector<std::size_t> effects_;
-};
-
-Status Designer::choose_effects(DesignedPlan* plan) {
-  const std::span<const Effect> catalogue = config_.problem.table().effects();
-  const std::vector<std::string> known = mapped(catalogue, &Effect::name);
-  for (const std::string& name : settings_.effects.empty() ? known : settings_.effects) {
-    const auto found = std::ranges::find(known, name);
-    if (found == known.end()) {
-      return Error{"there is no effect '" + name + "'" + suggestion(name, known)};
-    }
-    const auto effect = static_cast<std::size_t>(found - known.begin());
-    if (catalogue[effect].moves_means()) {
-      effects_.push_back(effect);
-    } else {
-      plan->not_planned_for.push_back(name);
-    }
-  }
-  if (effects_.empty()) {
-    return Error{
-        "none of these effects moves where a trial ends, so no plan shows them better than "
-        "another; name others with --effects"};
-  }
-  std::ranges::sort(effects_);
-  effects_.erase(std::unique(effects_.begin(), effects_.end()), effects_.end());
-  return {};
-}
-
-Sessions Designer::draw(unsigned times, std::uint64_t seed) const {
-  SimulateSettings simulate = config_.simulate;
-  const unsigned a_session = (settings_.trials + simulate.sessions - 1) / simulate.sessions;
-  simulate.trials_per_session = (a_session + chain() - 1) / chain() * chain();
-  simulate.sessions *= times;
-  return draw_plan(config_.problem, simulate, seed);
-}
-
-Result<TrialLog> Designer::driven(const Sessions& plan) {
-  Problem problem = without_log(config_.problem);
-  for (const NoiseRow& noise : {subject_->drive_common, subject_->drive_side,
-                                subject_->pose_position, subject_->pose_heading}) {
-    problem.values[noise.row] = problem.table()[noise.row].lower;
-  }
-  ASSIGN_OR_RETURN(const auto results, farm_.run(farm_.add_problem(to_proto(problem)),
-                                                 simulate_tasks(plan, {}, settings_.seed, 0)));
-  TrialLog log;
-  for (std::size_t s = 0; s < results.size(); ++s) {
-    const v1::TaskResult& result = results[s];
-    const Status ended =
-        ended_well(result, "the simulation", "; these parameters do not make a robot that drives");
-    if (!ended) return Error{ended.error().message, ErrorCode::kSimulation};
-    for (std::size_t i = 0; i < plan[s].size(); ++i) {
-      Trial trial = from_proto(result.simulate().trials(static_cast<int>(i)));
-      // What the least noise leaves between two readings of one place is no move.
-      if (!plan[s][i].moved() && i > 0) trial.X_WS = log.trials.back().X_WE;
-      log.trials.push_back(std::move(trial));
-    }
-  }
-  return log;
-}
-
-bool Designer::stays(const TrialLog& log, std::size_t first, std::size_t count) const {
-  const auto within = [&](double at) { return at >= 0 && at <= config_.simulate.arena_m; };
-  return std::all_of(log.trials.begin() + static_cast<std::ptrdiff_t>(first),
-                     log.trials.begin() + static_cast<std::ptrdiff_t>(first + count),
-                     [&](const Trial& t) { return within(t.X_WE.x) && within(t.X_WE.y); });
-}
-
-Result<std::vector<Chain>> Designer::choose(double* best_share) {
-  const Sessions pool = draw(settings_.pool, settings_.seed);
-  ASSIGN_OR_RETURN(const auto log, driven(pool));
-  ASSIGN_OR_RETURN(auto shown_signals, signals_of(log));
-  const auto trials = static_cast<double>(log.trials.size());
-  std::vector<const Shift*> shifts;
-  std::vector<double> scales;
-  for (const Shift& shift : shown_signals.shifts) {
-    const double all = information(shift.rows, shown_signals.nuisances);
-    if (all <= 0) continue;
-    shifts.push_back(&shift);
-    scales.push_back(std::sqrt(kInformation * trials / (settings_.trials * all)));
-  }
-  const Eigen::Index nuisances = shown_signals.nuisances.cols();
-  std::vector<Chain> chains;  // that stay on the floor
-  std::vector<Rows> candidates;
-  Eigen::Index first = 0;
-  for (Chain& chain : chains_of(pool)) {
-    const auto rows = static_cast<Eigen::Index>(3 * chain.size());
-    if (!stays(log, static_cast<std::size_t>(first / 3), chain.size())) {
-      first += rows;
-      continue;
-    }
-    Rows candidate(rows, static_cast<Eigen::Index>(shifts.size()) + nuisances);
-    for (std::size_t k = 0; k < shifts.size(); ++k) {
-      candidate.col(static_cast<Eigen::Index>(k)) =
-          scales[k] * shifts[k]->rows.segment(first, rows);
-    }
-    candidate.rightCols(nuisances) = shown_signals.nuisances.middleRows(first, rows);
-    candidates.push_back(std::move(candidate));
-    chains.push_back(std::move(chain));
-    first += rows;
-  }
-  std::vector<Chain> chosen;
-  const std::size_t wanted = (settings_.trials + chain() - 1) / chain();
-  if (chains.size() < wanted) {
-    return Error{
-        "only " + std::to_string(chains.size()) + " of " + std::to_string(wanted * settings_.pool) +
-        " chains of " + std::to_string(chain()) + " drives stay on a floor of " +
-        std::to_string(config_.simulate.arena_m) + " m, and " + std::to_string(wanted) +
-        " are wanted; give more --place, a shorter --chain or --durations, or a greater --pool"};
-  }
-  const std::vector<std::size_t> selected = select(candidates, nuisances, wanted);
-  for (const std::size_t c : selected) chosen.push_back(chains[c]);
-  *best_share = best_over_plan(candidates, nuisances, selected);
-  return chosen;
-}
-
 // The first trials of every session, as many as a share of the whole.
 std::vector<std::size_t> first_trials(const TrialLog& log, std::size_t part, std::size_t parts) {
   std::map<std::string, std::size_t> lengths, taken;
@@ -204,19 +60,156 @@ std::vector<std::size_t> first_trials(const TrialLog& log, std::size_t part, std
   return first;
 }
 
-std::vector<PowerPoint> Designer::power(const Signals& planned, const TrialLog& planned_log,
-                                        const Signals& random, const TrialLog& random_log,
-                                        const std::vector<Visibility>& at) const {
-  std::vector<PowerPoint> points;
-  for (std::size_t part = 1; part <= kPowerPoints; ++part) {
-    const auto of_plan = first_trials(planned_log, part, kPowerPoints);
-    const auto of_random = first_trials(random_log, part, kPowerPoints);
-    if (of_plan.empty() || of_random.empty()) continue;
-    points.push_back({of_plan.size(), mean_power(config_.problem, planned.of(of_plan), at),
-                      mean_power(config_.problem, random.of(of_random), at)});
+class Designer {
+ public:
+  Designer(Farm& farm, const Config& config, const PlanSettings& settings)
+      : farm_(farm),
+        config_(config),
+        settings_(settings),
+        subject_(diagnosis_subject(config.problem)) {}
+
+  Status choose_effects(DesignedPlan* plan) {
+    const std::span<const Effect> catalogue = config_.problem.table().effects();
+    const auto all = mapped(catalogue, &Effect::name);
+    ASSIGN_OR_RETURN(const auto asked,
+                     effects_named(config_.problem.table(),
+                                   settings_.effects.empty() ? all : settings_.effects));
+    for (const std::size_t effect : asked) {
+      if (catalogue[effect].moves_means()) {
+        effects_.push_back(effect);
+      } else {
+        plan->not_planned_for.push_back(catalogue[effect].name);
+      }
+    }
+    if (effects_.empty()) {
+      return Error{
+          "none of these effects moves where a trial ends, so no plan shows them better than "
+          "another; name others with --effects"};
+    }
+    std::ranges::sort(effects_);
+    effects_.erase(std::unique(effects_.begin(), effects_.end()), effects_.end());
+    return {};
   }
-  return points;
-}
+
+  Sessions draw(unsigned times, std::uint64_t seed) const {
+    SimulateSettings simulate = config_.simulate;
+    const unsigned a_session = (settings_.trials + simulate.sessions - 1) / simulate.sessions;
+    simulate.trials_per_session = (a_session + chain() - 1) / chain() * chain();
+    simulate.sessions *= times;
+    return draw_plan(config_.problem, simulate, seed);
+  }
+
+  // Where the model stops, without any noise.
+  Result<TrialLog> driven(const Sessions& plan) {
+    Problem problem = without_log(config_.problem);
+    for (const NoiseRow& noise : {subject_->drive_common, subject_->drive_side,
+                                  subject_->pose_position, subject_->pose_heading}) {
+      problem.values[noise.row] = problem.table()[noise.row].lower;
+    }
+    ASSIGN_OR_RETURN(const auto results, farm_.run(farm_.add_problem(to_proto(problem)),
+                                                   simulate_tasks(plan, {}, settings_.seed, 0)));
+    TrialLog log;
+    for (std::size_t s = 0; s < results.size(); ++s) {
+      const v1::TaskResult& result = results[s];
+      const Status ended = ended_well(result, "the simulation",
+                                      "; these parameters do not make a robot that drives");
+      if (!ended) return Error{ended.error().message, ErrorCode::kSimulation};
+      for (std::size_t i = 0; i < plan[s].size(); ++i) {
+        Trial trial = from_proto(result.simulate().trials(static_cast<int>(i)));
+        // What the least noise leaves between two readings of one place is no move.
+        if (!plan[s][i].moved() && i > 0) trial.X_WS = log.trials.back().X_WE;
+        log.trials.push_back(std::move(trial));
+      }
+    }
+    return log;
+  }
+
+  Result<Signals> signals_of(const TrialLog& log) {
+    return signals(farm_, config_.problem, log, {effects_, settings_.seed});
+  }
+
+  Result<std::vector<Chain>> choose(double* best_share) {
+    const Sessions pool = draw(settings_.pool, settings_.seed);
+    ASSIGN_OR_RETURN(const auto log, driven(pool));
+    ASSIGN_OR_RETURN(auto shown_signals, signals_of(log));
+    const auto trials = static_cast<double>(log.trials.size());
+    std::vector<const Shift*> shifts;
+    std::vector<double> scales;
+    for (const Shift& shift : shown_signals.shifts) {
+      const double all = information(shift.rows, shown_signals.nuisances);
+      if (all <= 0) continue;
+      shifts.push_back(&shift);
+      scales.push_back(std::sqrt(kInformation * trials / (settings_.trials * all)));
+    }
+    const Eigen::Index nuisances = shown_signals.nuisances.cols();
+    std::vector<Chain> chains;  // that stay on the floor
+    std::vector<Rows> candidates;
+    Eigen::Index first = 0;
+    for (Chain& chain : chains_of(pool)) {
+      const auto rows = static_cast<Eigen::Index>(3 * chain.size());
+      if (!stays(log, static_cast<std::size_t>(first / 3), chain.size())) {
+        first += rows;
+        continue;
+      }
+      Rows candidate(rows, static_cast<Eigen::Index>(shifts.size()) + nuisances);
+      for (std::size_t k = 0; k < shifts.size(); ++k) {
+        candidate.col(static_cast<Eigen::Index>(k)) =
+            scales[k] * shifts[k]->rows.segment(first, rows);
+      }
+      candidate.rightCols(nuisances) = shown_signals.nuisances.middleRows(first, rows);
+      candidates.push_back(std::move(candidate));
+      chains.push_back(std::move(chain));
+      first += rows;
+    }
+    std::vector<Chain> chosen;
+    const std::size_t wanted = (settings_.trials + chain() - 1) / chain();
+    if (chains.size() < wanted) {
+      return Error{
+          "only " + std::to_string(chains.size()) + " of " +
+          std::to_string(wanted * settings_.pool) + " chains of " + std::to_string(chain()) +
+          " drives stay on a floor of " + std::to_string(config_.simulate.arena_m) + " m, and " +
+          std::to_string(wanted) +
+          " are wanted; give more --place, a shorter --chain or --durations, or a greater --pool"};
+    }
+    const std::vector<std::size_t> selected = select(candidates, nuisances, wanted);
+    for (const std::size_t c : selected) chosen.push_back(chains[c]);
+    *best_share = best_over_plan(candidates, nuisances, selected);
+    return chosen;
+  }
+
+  // Whether all of these trials end within the arena.
+  bool stays(const TrialLog& log, std::size_t first, std::size_t count) const {
+    const auto within = [&](double at) { return at >= 0 && at <= config_.simulate.arena_m; };
+    return std::all_of(log.trials.begin() + static_cast<std::ptrdiff_t>(first),
+                       log.trials.begin() + static_cast<std::ptrdiff_t>(first + count),
+                       [&](const Trial& t) { return within(t.X_WE.x) && within(t.X_WE.y); });
+  }
+
+  unsigned chain() const { return std::max(1U, config_.simulate.chain); }
+
+  std::vector<PowerPoint> power(const Signals& planned, const TrialLog& planned_log,
+                                const Signals& random, const TrialLog& random_log,
+                                const std::vector<Visibility>& at) const {
+    std::vector<PowerPoint> points;
+    for (std::size_t part = 1; part <= kPowerPoints; ++part) {
+      const auto of_plan = first_trials(planned_log, part, kPowerPoints);
+      const auto of_random = first_trials(random_log, part, kPowerPoints);
+      if (of_plan.empty() || of_random.empty()) continue;
+      points.push_back({of_plan.size(), mean_power(config_.problem, planned.of(of_plan), at),
+                        mean_power(config_.problem, random.of(of_random), at)});
+    }
+    return points;
+  }
+
+  const std::vector<std::size_t>& effects() const { return effects_; }
+
+ private:
+  Farm& farm_;
+  const Config& config_;
+  const PlanSettings& settings_;
+  std::shared_ptr<const DiagnosisSubject> subject_;
+  std::vector<std::size_t> effects_;
+};
 
 // Of the same effects in the same order.
 void keep_common(std::vector<Visibility>* a, std::vector<Visibility>* b) {

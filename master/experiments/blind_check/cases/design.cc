@@ -53,26 +53,6 @@ struct Sizing {
   bool out_of_reach = false;
 };
 
-std::vector<std::string> effect_names(const ParameterTable& table) {
-  return mapped(table.effects(), &Effect::name);
-}
-
-// REQUIRES: check_effects() accepts the names.
-std::vector<std::size_t> chosen_effects(const ParameterTable& table,
-                                        const std::vector<std::string>& names) {
-  const std::vector<std::string> known = effect_names(table);
-  std::vector<std::size_t> chosen;
-  for (std::size_t e = 0; names.empty() && e < known.size(); ++e) {
-    // By itself a second one of a kind is the first under another name.
-    if (table.effects()[e].repeats.empty()) chosen.push_back(e);
-  }
-  for (const std::string& name : names) {
-    const auto found = std::ranges::find(known, name);
-    chosen.push_back(static_cast<std::size_t>(found - known.begin()));
-  }
-  return chosen;
-}
-
 // Collects cases before their names are dealt.
 class Drafts {
  public:
@@ -265,15 +245,6 @@ Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::ve
   return logs;
 }
 
-Status check_effects(const ParameterTable& table, const std::vector<std::string>& names) {
-  const std::vector<std::string> known = effect_names(table);
-  for (const std::string& name : names) {
-    if (contains(known, name)) continue;
-    return Error{"unknown effect '" + name + "'" + suggestion(name, known)};
-  }
-  return {};
-}
-
 Result<SizeLevel> size_level(const std::string& word) {
   if (word == "clear") return SizeLevel{word, 5};
   if (word == "subtle") return SizeLevel{word, 1.6};
@@ -301,8 +272,7 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
 Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
                                 const DesignProgress& progress) {
   const ParameterTable& table = planned.table();
-  RETURN_IF_ERROR(check_effects(table, settings.effects));
-  const std::vector<std::size_t> effects = chosen_effects(table, settings.effects);
+  ASSIGN_OR_RETURN(const auto effects, effects_named(table, settings.effects));
   Drafts drafts(planned, settings);
   draft_cases(settings, effects, drafts);
   RETURN_IF_ERROR(search_strengths(planned, drafts, farm, progress));

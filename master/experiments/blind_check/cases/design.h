@@ -43,9 +43,6 @@ struct BlindDesign {
   std::vector<OutOfReach> out_of_reach;
 };
 
-// Error: an effect that the table does not have, with a suggestion.
-Status check_effects(const ParameterTable& table, const std::vector<std::string>& names);
-
 // What is being done, and how much of it is done.
 using DesignProgress =
     std::function<void(const std::string& what, std::size_t done, std::size_t total)>;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/problem/problem.h"
 #include "master/report/prediction_table.h"
@@ -42,6 +43,22 @@ double draw_rest(const Parameter& p, const std::string& key, const Arena& arena,
 }
 
 }  // namespace
+
+Result<std::vector<std::size_t>> effects_named(const ParameterTable& table,
+                                               const std::vector<std::string>& names) {
+  const std::vector<std::string> known = mapped(table.effects(), &Effect::name);
+  std::vector<std::size_t> places;
+  for (std::size_t e = 0; names.empty() && e < known.size(); ++e) {
+    if (table.effects()[e].repeats.empty()) places.push_back(e);
+  }
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(known, name);
+    if (found == known.end())
+      return Error{"unknown effect '" + name + "'" + suggestion(name, known)};
+    places.push_back(static_cast<std::size_t>(found - known.begin()));
+  }
+  return places;
+}
 
 Arena arena_of(const TrialLog& log, double share) {
   const auto x = mapped(log.trials, [](const Trial& trial) { return trial.X_WS.x; });

@@ -2,14 +2,21 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/parameters/table.h"
 #include "common/random/stream.h"
 #include "common/trials/trial.h"
 #include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
+
+// Where effects of these names stand in the table; without a name all but second ones of a kind,
+// each of which by itself is the first under another name.  Error: there is no such effect.
+Result<std::vector<std::size_t>> effects_named(const ParameterTable& table,
+                                               const std::vector<std::string>& names = {});
 
 // Where trials start, m, world frame: places of patches and seams are drawn in its middle.
 struct Arena {
