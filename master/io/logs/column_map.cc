@@ -287,10 +287,7 @@ std::span<const std::string> known_units() {
 
 std::string format_map(const LogMap& map) {
   std::string out;
-  write_table("poses", map.poses, out);
-  write_table("commands", map.commands, out);
-  write_table("wheels", map.wheels, out);
-  write_table("gyro", map.gyro, out);
+  for (const RowKind& kind : kRowKinds) write_table(kind.name, map.*kind.map, out);
   return out;
 }
 
@@ -300,10 +297,7 @@ Result<LogMap> parse_map(std::string_view text, const std::string& file) {
   TomlSection root(table, "", errors);
   LogMap map;
   MapReader reader(errors);
-  reader.read(root, "poses", map.poses);
-  reader.read(root, "commands", map.commands);
-  reader.read(root, "wheels", map.wheels);
-  reader.read(root, "gyro", map.gyro);
+  for (const RowKind& kind : kRowKinds) reader.read(root, kind.name, map.*kind.map);
   root.finish();
   const TableMap& p = map.poses;
   const bool heading =

@@ -48,6 +48,17 @@ struct LogMap {
   std::string no_heading;                  // the first table that has x and y and no heading
 };
 
+// The kinds of rows, as a map and its files call them.
+struct RowKind {
+  const char* name;
+  TableMap LogMap::*map;
+  std::vector<CommandRow> LoggedRun::*rows;  // null of poses, which are rows of their own kind
+};
+inline constexpr RowKind kRowKinds[] = {{"poses", &LogMap::poses, nullptr},
+                                        {"commands", &LogMap::commands, &LoggedRun::commands},
+                                        {"wheels", &LogMap::wheels, &LoggedRun::wheel_speeds},
+                                        {"gyro", &LogMap::gyro, &LoggedRun::yaw_rates}};
+
 // Factor to SI of a unit ("mm", "deg", "ns", "rpm", ...), 0 when nobody knows it.
 double unit_factor(std::string_view unit);
 std::span<const std::string> known_units();

@@ -4,6 +4,7 @@
 #include <map>
 #include <numbers>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -19,11 +20,6 @@ namespace {
 constexpr double kGreatest = 1e12;
 // What queues and networks hold up comes later by less, s.
 constexpr double kLatest_s = 1;
-
-struct Kind {
-  const char* name;
-  const TableMap* map;
-};
 
 // Rows of one kind, of one run; values in SI, one a role after t.
 struct Stretch {
@@ -43,7 +39,7 @@ struct Tally {
 std::string stem_of(const std::string& file) {
   const std::filesystem::path path(file);
   const std::string stem = path.stem().string();
-  const bool plain = stem == "poses" || stem == "commands" || stem == "wheels" || stem == "gyro";
+  const bool plain = contains(kRowKinds, stem, &RowKind::name);
   const std::string folder = path.parent_path().filename().string();
   return plain && !folder.empty() ? folder : stem;
 }
@@ -55,13 +51,13 @@ class Importer {
 
   Result<ImportedRuns> run() {
     for (std::size_t i = 0; i < recordings_.size(); ++i) {
-      for (const Kind& kind : kinds()) RETURN_IF_ERROR(take(i, kind));
+      for (const RowKind& kind : kRowKinds) RETURN_IF_ERROR(take(i, kind));
     }
-    for (const Kind& kind : kinds()) {
+    for (const RowKind& kind : kRowKinds) {
       const Tally& tally = tallies_[kind.name];
-      const bool wanted = kind.map == &map_.poses || kind.map == &map_.commands;
-      if (wanted && !kind.map->columns.empty() && tally.taken == 0)
-        return no_rows(recordings_, *kind.map, kind.name);
+      const bool wanted = kind.map == &LogMap::poses || kind.map == &LogMap::commands;
+      if (wanted && !(map_.*kind.map).columns.empty() && tally.taken == 0)
+        return no_rows(recordings_, map_.*kind.map, kind.name);
       if (tally.set_back || tally.back > tally.taken) return out_of_order(kind, tally);
     }
     assemble();
@@ -79,7 +75,7 @@ class Importer {
 
  private:
   // Several runs, a clock that was set back, or rows in no order.
-  static Error out_of_order(const Kind& kind, const Tally& tally) {
+  static Error out_of_order(const RowKind& kind, const Tally& tally) {
     return Error{tally.place + ": found " + std::to_string(tally.back) + " of " +
                  std::to_string(tally.back + tally.taken) + " rows of " + kind.name +
                  " at times before the row above, expected the order of time; sort them, cut the "
@@ -87,15 +83,8 @@ class Importer {
                  "a column and write run = \"COLUMN\" in the map"};
   }
 
-  std::vector<Kind> kinds() const {
-    return {{"poses", &map_.poses},
-            {"commands", &map_.commands},
-            {"wheels", &map_.wheels},
-            {"gyro", &map_.gyro}};
-  }
-
-  Status take(std::size_t recording, const Kind& kind) {
-    const TableMap& map = *kind.map;
+  Status take(std::size_t recording, const RowKind& kind) {
+    const TableMap& map = map_.*kind.map;
     if (map.columns.empty()) return {};
     for (const LogTable& table : recordings_[recording].tables) {
       if (!map.source.empty() && table.topic != map.source && !table.source.ends_with(map.source)) {
@@ -107,9 +96,9 @@ class Importer {
     return {};
   }
 
-  Status take_table(std::size_t recording, const LogTable& table, const Kind& kind) {
-    const TableMap& map = *kind.map;
-    const bool poses = kind.map == &map_.poses;
+  Status take_table(std::size_t recording, const LogTable& table, const RowKind& kind) {
+    const TableMap& map = map_.*kind.map;
+    const bool poses = kind.rows == nullptr;
     std::vector<std::size_t> at;
     std::vector<SiLine> lines;
     for (const MappedColumn& c : map.columns) {
@@ -193,10 +182,11 @@ class Importer {
   // none where a kind has a table of its own, which would not be parted with it.
   std::set<std::size_t> broken_rows(const LogTable& table) const {
     std::set<std::size_t> broken;
-    for (const Kind& kind : kinds()) {
-      if (!has_all(table, *kind.map)) return {};
-      if (!kind.map->increments && !kind.map->intervals) continue;
-      for (const MappedColumn& c : kind.map->columns) {
+    for (const RowKind& kind : kRowKinds) {
+      const TableMap& map = map_.*kind.map;
+      if (!has_all(table, map)) return {};
+      if (!map.increments && !map.intervals) continue;
+      for (const MappedColumn& c : map.columns) {
         for (std::size_t r = 0; r < table.rows(); ++r) {
           if (!std::isfinite(table.at(r, *table.find(c.column)))) broken.insert(r);
         }
@@ -239,9 +229,9 @@ class Importer {
     std::vector<std::vector<std::size_t>> whole;
     std::vector<std::size_t> only_poses, others;
     for (std::size_t i = 0; i < recordings_.size(); ++i) {
-      const bool poses = stretches_["poses"].count(i) != 0;
-      const bool commanded = stretches_["commands"].count(i) != 0 ||
-                             stretches_["wheels"].count(i) != 0 || stretches_["gyro"].count(i) != 0;
+      const auto has = [&](const RowKind& kind) { return stretches_[kind.name].count(i) != 0; };
+      const bool poses = has(kRowKinds[0]);
+      const bool commanded = std::ranges::any_of(std::span(kRowKinds).subspan(1), has);
       if (poses && commanded) whole.push_back({i});
       if (poses && !commanded) only_poses.push_back(i);
       if (!poses && commanded) others.push_back(i);
@@ -261,17 +251,17 @@ class Importer {
   void assemble() {
     RunLog& log = out_.log;
     log.relative = map_.poses.increments;
-    for (const MappedColumn& c : map_.commands.columns) {
-      if (c.role != "t") log.channels.push_back(c.role);
-    }
-    for (const MappedColumn& c : map_.wheels.columns) {
-      if (c.role != "t") log.wheel_channels.push_back(c.role);
+    for (const auto& [map, channels] :
+         {std::pair{&map_.commands, &log.channels}, {&map_.wheels, &log.wheel_channels}}) {
+      for (const MappedColumn& c : map->columns) {
+        if (c.role != "t") channels->push_back(c.role);
+      }
     }
     const auto all = groups();
     for (const auto& group : all) {
       std::map<std::string, LoggedRun> runs;
       std::vector<std::string> order;
-      for (const Kind& kind : kinds()) {
+      for (const RowKind& kind : kRowKinds) {
         for (const std::size_t i : group) {
           const auto found = stretches_[kind.name].find(i);
           if (found == stretches_[kind.name].end()) continue;
@@ -308,25 +298,23 @@ class Importer {
     return first;
   }
 
-  static void add(const Kind& kind, const Stretch& stretch, LoggedRun& run,
-                  std::vector<std::string>& order, const std::string& name) {
+  void add(const RowKind& kind, const Stretch& stretch, LoggedRun& run,
+           std::vector<std::string>& order, const std::string& name) const {
     if (!contains(order, name)) order.push_back(name);
-    const std::string_view what = kind.name;
-    const bool increments = what == "poses" && kind.map->increments;
-    if (increments && kind.map->intervals) run.poses.push_back({0, {}});
+    const bool increments = kind.rows == nullptr && map_.poses.increments;
+    if (increments && map_.poses.intervals) run.poses.push_back({0, {}});
     for (std::size_t i = 0; i < stretch.t_s.size(); ++i) {
       const std::vector<double>& row = stretch.rows[i];
-      Pose X{row.size() < 3 ? 0 : row[0], row.size() < 3 ? 0 : row[1], row.size() < 3 ? 0 : row[2]};
-      // The first one's leads on from a pose that nobody has.
-      if (what == "poses") {
-        std::optional<Eigen::Matrix3d> noise;
-        if (row.size() > 3 && !run.poses.empty()) noise = noise_of(std::span(row).subspan(3));
-        if (increments) X = run.poses.empty() ? Pose() : run.poses.back().X_WM * X;
-        run.poses.push_back({stretch.t_s[i], X, noise});
+      if (kind.rows != nullptr) {
+        (run.*kind.rows).push_back({stretch.t_s[i], row});
+        continue;
       }
-      if (what == "commands") run.commands.push_back({stretch.t_s[i], row});
-      if (what == "wheels") run.wheel_speeds.push_back({stretch.t_s[i], row});
-      if (what == "gyro") run.yaw_rates.push_back({stretch.t_s[i], row});
+      // The first one's leads on from a pose that nobody has.
+      Pose X{row[0], row[1], row[2]};
+      std::optional<Eigen::Matrix3d> noise;
+      if (row.size() > 3 && !run.poses.empty()) noise = noise_of(std::span(row).subspan(3));
+      if (increments) X = run.poses.empty() ? Pose() : run.poses.back().X_WM * X;
+      run.poses.push_back({stretch.t_s[i], X, noise});
     }
   }
 
@@ -345,15 +333,16 @@ class Importer {
   }
 
   void report() {
-    for (const Kind& kind : kinds()) {
-      if (kind.map->columns.empty()) continue;
+    for (const RowKind& kind : kRowKinds) {
+      const TableMap& map = map_.*kind.map;
+      if (map.columns.empty()) continue;
       const Tally& tally = tallies_[kind.name];
-      const std::string source = kind.map->source.empty() ? "" : " of " + kind.map->source;
+      const std::string source = map.source.empty() ? "" : " of " + map.source;
       out_.report.push_back(
           "took: " + std::to_string(tally.taken) + " " + kind.name + source + " (" +
-          joined(kind.map->columns, ", ", [](const MappedColumn& c) { return c.column; }) + ")");
+          joined(map.columns, ", ", [](const MappedColumn& c) { return c.column; }) + ")");
       const std::pair<std::size_t, std::string> omitted[] = {
-          {tally.dropped, " where " + kind.map->keep + " is 0"},
+          {tally.dropped, " where " + map.keep + " is 0"},
           {tally.blank, " without all their numbers"},
           {tally.back, " whose time goes back"}};
       for (const auto& [n, why] : omitted) {
@@ -384,9 +373,9 @@ class Importer {
 Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map) {
   LogMap ordered = map;
   // The time stands first in every row.
-  for (TableMap* table : {&ordered.poses, &ordered.commands, &ordered.wheels, &ordered.gyro}) {
-    std::stable_partition(table->columns.begin(), table->columns.end(),
-                          [](const MappedColumn& c) { return c.role == "t"; });
+  for (const RowKind& kind : kRowKinds) {
+    std::ranges::stable_partition((ordered.*kind.map).columns,
+                                  [](const MappedColumn& c) { return c.role == "t"; });
   }
   return Importer(recordings, ordered).run();
 }
