@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -70,18 +69,6 @@ class ByteSource {
   virtual std::uint64_t size() const = 0;
   // Exactly `count` bytes at `offset` into `to`; false where the file ends before.
   virtual bool read(std::uint64_t offset, std::size_t count, std::string& to) = 0;
-};
-
-class FileSource : public ByteSource {
- public:
-  static Result<FileSource> open(const std::string& path);
-  std::uint64_t size() const override { return size_; }
-  bool read(std::uint64_t offset, std::size_t count, std::string& to) override;
-
- private:
-  FileSource() = default;
-  std::ifstream file_;
-  std::uint64_t size_ = 0;
 };
 
 // One a row of formats.inc; errors name `path`.

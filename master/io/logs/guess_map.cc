@@ -58,45 +58,36 @@ const Aliases kTime = {
 const Aliases kRun = {"run", "step", "trial", "take"};
 const Aliases kKeep = {"pose_new"};
 
-const std::vector<Role>& pose_roles() {
-  static const std::vector<Role> kRoles = {
-      {"x",
-       {"x", "*.position.x", "vicon.x", "*.pose.x", "*.translation.x", "px", "pos_x", "x_m", "dx"}},
-      {"y",
-       {"y", "*.position.y", "vicon.y", "*.pose.y", "*.translation.y", "py", "pos_y", "y_m", "dy"}},
-      {"z", {"z", "*.position.z", "*.translation.z"}},
-      {"theta",
-       {"theta", "yaw", "heading", "vicon.yaw", "*.pose.theta", "theta_rad", "yaw_deg", "theta_deg",
-        "heading_deg", "dtheta", "dyaw"}},
-      {"qx", {"qx", "*.orientation.x", "*.rotation.x"}},
-      {"qy", {"qy", "*.orientation.y", "*.rotation.y"}},
-      {"qz", {"qz", "*.orientation.z", "*.rotation.z"}},
-      {"qw", {"qw", "*.orientation.w", "*.rotation.w"}}};
-  return kRoles;
-}
+const std::vector<Role> kPoseRoles = {
+    {"x",
+     {"x", "*.position.x", "vicon.x", "*.pose.x", "*.translation.x", "px", "pos_x", "x_m", "dx"}},
+    {"y",
+     {"y", "*.position.y", "vicon.y", "*.pose.y", "*.translation.y", "py", "pos_y", "y_m", "dy"}},
+    {"z", {"z", "*.position.z", "*.translation.z"}},
+    {"theta",
+     {"theta", "yaw", "heading", "vicon.yaw", "*.pose.theta", "theta_rad", "yaw_deg", "theta_deg",
+      "heading_deg", "dtheta", "dyaw"}},
+    {"qx", {"qx", "*.orientation.x", "*.rotation.x"}},
+    {"qy", {"qy", "*.orientation.y", "*.rotation.y"}},
+    {"qz", {"qz", "*.orientation.z", "*.rotation.z"}},
+    {"qw", {"qw", "*.orientation.w", "*.rotation.w"}}};
 
 // Sets of channels that go together; the first that is whole counts.
-const std::vector<std::vector<Role>>& command_roles() {
-  static const std::vector<std::vector<Role>> kSets = {
-      {{"left", {"cmd_left", "command_left", "left_cmd", "left"}},
-       {"right", {"cmd_right", "command_right", "right_cmd", "right"}}},
-      {{"throttle", {"throttle", "*.throttle"}}, {"steering", {"steering", "*.steering"}}},
-      {{"v", {"v", "cmd_v", "v_cmd", "*.cmd_vel.linear.x", "*.twist.linear.x", "linear.x"}},
-       {"omega",
-        {"w", "omega", "cmd_w", "w_cmd", "*.cmd_vel.angular.z", "*.twist.angular.z", "angular.z"}}},
-      {{"speed", {"drive.speed", "speed", "cmd_speed"}},
-       {"steering", {"drive.steering_angle", "steering_angle", "cmd_steering"}}},
-      {{"left", {"vl", "v_left"}}, {"right", {"vr", "v_right"}}},
-      {{"w1", {"w1"}}, {"w2", {"w2"}}, {"w3", {"w3"}}, {"w4", {"w4"}}}};
-  return kSets;
-}
+const std::vector<std::vector<Role>> kCommandRoles = {
+    {{"left", {"cmd_left", "command_left", "left_cmd", "left"}},
+     {"right", {"cmd_right", "command_right", "right_cmd", "right"}}},
+    {{"throttle", {"throttle", "*.throttle"}}, {"steering", {"steering", "*.steering"}}},
+    {{"v", {"v", "cmd_v", "v_cmd", "*.cmd_vel.linear.x", "*.twist.linear.x", "linear.x"}},
+     {"omega",
+      {"w", "omega", "cmd_w", "w_cmd", "*.cmd_vel.angular.z", "*.twist.angular.z", "angular.z"}}},
+    {{"speed", {"drive.speed", "speed", "cmd_speed"}},
+     {"steering", {"drive.steering_angle", "steering_angle", "cmd_steering"}}},
+    {{"left", {"vl", "v_left"}}, {"right", {"vr", "v_right"}}},
+    {{"w1", {"w1"}}, {"w2", {"w2"}}, {"w3", {"w3"}}, {"w4", {"w4"}}}};
 
-const std::vector<Role>& wheel_roles() {
-  static const std::vector<Role> kRoles = {
-      {"left", {"wheel_left", "left_wheel", "enc_left", "odol"}},
-      {"right", {"wheel_right", "right_wheel", "enc_right", "odor"}}};
-  return kRoles;
-}
+const std::vector<Role> kWheelRoles = {
+    {"left", {"wheel_left", "left_wheel", "enc_left", "odol"}},
+    {"right", {"wheel_right", "right_wheel", "enc_right", "odor"}}};
 
 // The numbers of a column that are there.
 std::vector<double> numbers(const LogTable& table, const std::string& column) {
@@ -195,7 +186,7 @@ class Guess {
   void guess_poses(const LogTable& table, const std::string& time, bool odometry) {
     TableMap found;
     start(table, time, found);
-    for (const Role& role : pose_roles()) {
+    for (const Role& role : kPoseRoles) {
       const std::string column = column_of(table, role.aliases);
       if (!column.empty()) found.columns.push_back({role.name, column, ""});
     }
@@ -236,7 +227,7 @@ class Guess {
   }
 
   void guess_commands(const LogTable& table, const std::string& time) {
-    for (const std::vector<Role>& set : command_roles()) {
+    for (const std::vector<Role>& set : kCommandRoles) {
       TableMap found;
       start(table, time, found);
       for (const Role& role : set) {
@@ -273,7 +264,7 @@ class Guess {
   void guess_wheels(const LogTable& table, const std::string& time) {
     TableMap found;
     start(table, time, found);
-    for (const Role& role : wheel_roles()) {
+    for (const Role& role : kWheelRoles) {
       const std::string column = column_of(table, role.aliases);
       if (!column.empty()) found.columns.push_back({role.name, column, rim_unit(table, column)});
     }

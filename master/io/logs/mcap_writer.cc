@@ -26,12 +26,8 @@ enum WrittenOp : unsigned char {
 };
 
 template <class T>
-std::string number(T value) {  // little-endian
-  std::string bytes;
-  for (std::size_t k = 0; k < sizeof(T); ++k) {
-    bytes += static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * k) & 0xff);
-  }
-  return bytes;
+std::string number(T value) {  // little-endian, as this machine is (message.cc)
+  return {reinterpret_cast<const char*>(&value), sizeof value};
 }
 
 using U16 = std::uint16_t;

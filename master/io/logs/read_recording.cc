@@ -3,6 +3,7 @@
 #include <zstd.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "common/base/text.h"
 #include "common/recordings/run.h"
@@ -104,30 +105,37 @@ std::string format_commands(const std::vector<std::string>& channels, const RunL
   return any ? out : "";
 }
 
+class FileSource : public ByteSource {
+ public:
+  static Result<FileSource> open(const std::string& path) {
+    std::error_code code;
+    if (std::filesystem::is_directory(path, code)) {
+      return Error{path + ": a folder; give the file in it (.db3, .mcap, .bag or .csv)"};
+    }
+    FileSource source;
+    source.file_.open(path, std::ios::binary);
+    source.size_ = std::filesystem::file_size(path, code);
+    if (!source.file_ || code) {
+      return Error{path + ": no such file, or it cannot be read; check the path"};
+    }
+    return source;
+  }
+  std::uint64_t size() const override { return size_; }
+  bool read(std::uint64_t offset, std::size_t count, std::string& to) override {
+    if (offset > size_ || size_ - offset < count) return false;
+    to.resize(count);
+    file_.clear();
+    file_.seekg(static_cast<std::streamoff>(offset));
+    file_.read(to.data(), static_cast<std::streamsize>(count));
+    return file_.gcount() == static_cast<std::streamsize>(count);
+  }
+
+ private:
+  std::ifstream file_;
+  std::uint64_t size_ = 0;
+};
+
 }  // namespace
-
-Result<FileSource> FileSource::open(const std::string& path) {
-  std::error_code code;
-  if (std::filesystem::is_directory(path, code)) {
-    return Error{path + ": a folder; give the file in it (.db3, .mcap, .bag or .csv)"};
-  }
-  FileSource source;
-  source.file_.open(path, std::ios::binary);
-  source.size_ = std::filesystem::file_size(path, code);
-  if (!source.file_ || code) {
-    return Error{path + ": no such file, or it cannot be read; check the path"};
-  }
-  return source;
-}
-
-bool FileSource::read(std::uint64_t offset, std::size_t count, std::string& to) {
-  if (offset > size_ || size_ - offset < count) return false;
-  to.resize(count);
-  file_.clear();
-  file_.seekg(static_cast<std::streamoff>(offset));
-  file_.read(to.data(), static_cast<std::streamsize>(count));
-  return file_.gcount() == static_cast<std::streamsize>(count);
-}
 
 Result<Recording> read_recording(const std::string& path, bool skip_invalid) {
   ASSIGN_OR_RETURN(auto source, FileSource::open(path));
