@@ -57,12 +57,8 @@ class Guess {
 
   static bool free(const ChassisWheel& wheel) { return !wheel.caster && !wheel.steered; }
 
-  double along(const Eigen::Vector3d& p_B) const {
-    return std::cos(guess_.forward_rad) * p_B.x() + std::sin(guess_.forward_rad) * p_B.y();
-  }
-  double across(const Eigen::Vector3d& p_B) const {
-    const Eigen::Vector3d from = p_B - middle_B_;
-    return -std::sin(guess_.forward_rad) * from.x() + std::cos(guess_.forward_rad) * from.y();
+  double across(const ChassisWheel& wheel) const {
+    return guess_.across(wheel.centre_B_m - middle_B_);
   }
 
   // Forward is across the axles; nearly always the root's x.
@@ -90,8 +86,8 @@ class Guess {
     // Either way is across the axles; the sides' names decide, else the way closer to x or y.
     double left = 0;
     for (const ChassisWheel& wheel : chassis_.wheels) {
-      if (contains_any(wheel.joint->name, {"left"})) left += across(wheel.centre_B_m);
-      if (contains_any(wheel.joint->name, {"right"})) left -= across(wheel.centre_B_m);
+      if (contains_any(wheel.joint->name, {"left"})) left += across(wheel);
+      if (contains_any(wheel.joint->name, {"right"})) left -= across(wheel);
     }
     const bool turn = left != 0 ? left < 0 : std::sin(guess_.forward_rad) < 0;
     if (turn) guess_.forward_rad = wrap_angle(guess_.forward_rad + pi);
@@ -115,7 +111,7 @@ class Guess {
     for (const ChassisWheel& wheel : chassis_.wheels) {
       if (wheel.steered) steered.push_back(&wheel);
       if (!free(wheel)) continue;
-      const double y = across(wheel.centre_B_m);
+      const double y = across(wheel);
       if (wheel.named) (y > 0 ? left : right).push_back(&wheel);
     }
     const DriveFacts* stated = stated_drive();
@@ -174,8 +170,8 @@ class Guess {
       return {};
     }
     if (steered.size() == 2) {
-      const double apart = along(steered[0]->centre_B_m) - along(steered[1]->centre_B_m);
-      const double track = across(steered[0]->centre_B_m) - across(steered[1]->centre_B_m);
+      const double apart = guess_.along(steered[0]->centre_B_m - steered[1]->centre_B_m);
+      const double track = across(*steered[0]) - across(*steered[1]);
       if (std::abs(apart) < 0.2 * std::abs(track)) {
         guess_.drive = DriveKind::kAckermann;
         return {};

@@ -39,16 +39,13 @@ class Understanding {
 
   Result<RobotReading> run() {
     ASSIGN_OR_RETURN(chassis_, find_chassis(model_, facts_));
-    for (const UrdfNote& note : model_.notes) {
-      reading_.remarks.push_back("line " + std::to_string(note.line) + ": " + note.text);
-    }
-    for (const std::string& remark : chassis_.remarks) reading_.remarks.push_back(remark);
+    remark(model_.notes);
+    remark(chassis_.remarks);
     mark_driven();
-    ASSIGN_OR_RETURN(const auto guess, guess_drive(model_, chassis_, facts_));
-    robot().drive = guess.drive;
-    forward_ = guess.forward_rad;
-    reading_.evidence = guess.evidence;
-    for (const std::string& remark : guess.remarks) reading_.remarks.push_back(remark);
+    ASSIGN_OR_RETURN(guess_, guess_drive(model_, chassis_, facts_));
+    robot().drive = guess_.drive;
+    reading_.evidence = guess_.evidence;
+    remark(guess_.remarks);
     place_wheels();
     name_wheels();
     read_masses();
@@ -65,6 +62,9 @@ class Understanding {
 
  private:
   GroundRobot& robot() { return reading_.robot; }
+  void remark(const std::vector<std::string>& all) {
+    reading_.remarks.insert(reading_.remarks.end(), all.begin(), all.end());
+  }
 
   bool free(const ChassisWheel& wheel) const { return !wheel.caster && !wheel.steered; }
 
@@ -79,13 +79,6 @@ class Understanding {
         "no controller, plugin or transmission names a wheel; all but casters are taken as driven");
   }
 
-  double along(const Eigen::Vector3d& p_B) const {
-    return std::cos(forward_) * p_B.x() + std::sin(forward_) * p_B.y();
-  }
-  double across(const Eigen::Vector3d& p_B) const {
-    return -std::sin(forward_) * p_B.x() + std::cos(forward_) * p_B.y();
-  }
-
   // R: midway between the wheels that the drive turns about.
   void place_wheels() {
     const bool car = is_steered(robot());
@@ -97,14 +90,14 @@ class Understanding {
       ++count;
     }
     origin_B_ = sum / std::max(count, 1);
-    reading_.X_BR = {origin_B_.x(), origin_B_.y(), forward_};
+    reading_.X_BR = {origin_B_.x(), origin_B_.y(), guess_.forward_rad};
     for (const ChassisWheel& wheel : chassis_.wheels) add_wheel(wheel, car);
     for (const ChassisSupport& support : chassis_.supports) {
       RobotWheel wheel;
       wheel.kind = WheelKind::kCaster;
       wheel.driven = false;
-      wheel.x_m = along(support.point_B_m - origin_B_);
-      wheel.y_m = across(support.point_B_m - origin_B_);
+      wheel.x_m = guess_.along(support.point_B_m - origin_B_);
+      wheel.y_m = guess_.across(support.point_B_m - origin_B_);
       add(wheel, {"", support.name, support.line, "", "", false, {}, {}, false, {}});
     }
   }
@@ -125,8 +118,8 @@ class Understanding {
     if (found.caster && found.turning != nullptr) {
       place = poses_.find(found.turning->child)->second.translation();
     }
-    wheel.x_m = along(place - origin_B_);
-    wheel.y_m = across(place - origin_B_);
+    wheel.x_m = guess_.along(place - origin_B_);
+    wheel.y_m = guess_.across(place - origin_B_);
     wheel.radius_m = found.radius_m;
     wheel.width_m = found.width_m;
     wheel.steered = found.steered;
@@ -134,7 +127,7 @@ class Understanding {
     const bool wheel_of_car = car && !found.caster;
     if (!wheel.driven && !wheel_of_car) wheel.kind = WheelKind::kCaster;
     const double rolls = std::atan2(-found.axis_B.x(), found.axis_B.y());
-    const double heading = wrap_angle(rolls - forward_);
+    const double heading = wrap_angle(rolls - guess_.forward_rad);
     WheelSource source;
     source.joint = found.joint->name;
     source.link = found.link->name;
@@ -212,15 +205,15 @@ class Understanding {
 
   void read_masses() {
     const MassSum masses = sum_masses(model_, poses_);
-    for (const std::string& remark : masses.remarks) reading_.remarks.push_back(remark);
+    remark(masses.remarks);
     if (masses.mass_kg <= 0) {
       reading_.remarks.push_back("no link has a mass; state mass in kg in the robot's table");
       return;
     }
     robot().mass_kg = masses.mass_kg;
     const Eigen::Vector3d from = masses.com_B_m - origin_B_;
-    robot().com_x_m = along(from);
-    robot().com_y_m = across(from);
+    robot().com_x_m = guess_.along(from);
+    robot().com_y_m = guess_.across(from);
     robot().com_z_m = masses.com_B_m.z() - chassis_.floor_z_B_m;
     if (masses.yaw_inertia_kgm2 > 0) robot().yaw_inertia_kg_m2 = masses.yaw_inertia_kgm2;
     std::vector<Eigen::Vector2d> points;
@@ -267,7 +260,7 @@ class Understanding {
         RobotOutline drawn{link.name, {}};
         for (const Eigen::Vector2d& corner : outline(poses_.find(link.name)->second, shape)) {
           const Eigen::Vector3d from = Eigen::Vector3d(corner.x(), corner.y(), 0) - origin_B_;
-          drawn.corners_R_m.emplace_back(along(from), across(from));
+          drawn.corners_R_m.emplace_back(guess_.along(from), guess_.across(from));
         }
         if (drawn.corners_R_m.size() >= 3) reading_.outlines.push_back(std::move(drawn));
       }
@@ -279,7 +272,7 @@ class Understanding {
   LinkPoses poses_;
   Chassis chassis_;
   RobotReading reading_;
-  double forward_ = 0;  // of R's x in B, rad
+  DriveGuess guess_;
   Eigen::Vector3d origin_B_ = Eigen::Vector3d::Zero();
 };
 

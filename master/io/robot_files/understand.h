@@ -2,6 +2,7 @@
 // masses, and every place where two of them say different things.
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -107,6 +108,13 @@ struct DriveGuess {
   double forward_rad = 0;  // the way ahead in frame B
   std::vector<std::string> evidence;
   std::vector<std::string> remarks;
+
+  double along(const Eigen::Vector3d& from_B) const {
+    return std::cos(forward_rad) * from_B.x() + std::sin(forward_rad) * from_B.y();
+  }
+  double across(const Eigen::Vector3d& from_B) const {
+    return -std::sin(forward_rad) * from_B.x() + std::cos(forward_rad) * from_B.y();
+  }
 };
 
 // By the wheels and what `facts` state.  Errors: none of gapfarm's drives, with what was found.

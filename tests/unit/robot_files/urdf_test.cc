@@ -77,7 +77,7 @@ TEST(Urdf, ReadsOverPrefixesThatNobodyDeclared) {
       two_wheels("<gazebo reference='base'><sensor:camera name='c'/></gazebo>"), "r.urdf");
   ASSERT_TRUE(model) << model.error().message;
   ASSERT_EQ(model->notes.size(), 1u);
-  EXPECT_THAT(model->notes[0].text, HasSubstr("sensor:camera"));
+  EXPECT_THAT(model->notes[0], HasSubstr("sensor:camera"));
 }
 
 TEST(Urdf, PutsSimpleXacroInAndRefusesMacros) {

@@ -75,12 +75,6 @@ struct UrdfPlugin {
   int line = 0;
 };
 
-// What was odd about the file but did not keep it from being read.
-struct UrdfNote {
-  int line = 0;
-  std::string text;
-};
-
 struct UrdfModel {
   std::string file;
   std::string name;
@@ -90,7 +84,7 @@ struct UrdfModel {
   std::vector<UrdfSurface> surfaces;
   std::vector<UrdfPlugin> plugins;
   std::vector<std::string> actuated;  // joints that a <transmission> or a <ros2_control> drives
-  std::vector<UrdfNote> notes;
+  std::vector<std::string> notes;     // what was odd, but did not keep it from being read
 
   const UrdfLink* find_link(std::string_view name) const;
   // The joint whose child `link` is; null for the root.

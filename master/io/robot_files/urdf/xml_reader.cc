@@ -75,6 +75,13 @@ void XmlReader::fail(const Element& at, const std::string& sentence) {
   if (!error_) error_ = Error{file_ + ":" + std::to_string(at.GetLineNum()) + ": " + sentence};
 }
 
+std::vector<const XmlReader::Element*> XmlReader::children(const Element& of, const char* name) {
+  std::vector<const Element*> all;
+  const Element* child = of.FirstChildElement(name);
+  for (; child != nullptr; child = child->NextSiblingElement(name)) all.push_back(child);
+  return all;
+}
+
 std::string XmlReader::attribute(const Element& element, const char* name) {
   const char* raw = element.Attribute(name);
   if (raw == nullptr) return {};

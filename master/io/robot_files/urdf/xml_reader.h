@@ -35,6 +35,8 @@ class XmlReader {
 
  protected:
   void fail(const Element& at, const std::string& sentence);
+  // All, or those of a name.
+  static std::vector<const Element*> children(const Element& of, const char* name = nullptr);
 
   // With expressions put in where names() settle them.  Empty when it is not there.
   std::string attribute(const Element& element, const char* name);
