@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -210,8 +211,15 @@ class YamlReader {
   explicit YamlReader(const std::string& file) { read_.file = file; }
 
   Result<ControllerFile> read(const YAML::Node& root) {
-    collect_types(root, 0);
-    collect_drives(root, 0);
+    // "NAME: {type: T}", wherever it stands; ROS 2 keeps it under controller_manager.
+    walk(root, 0, [&](const YAML::Node& key, const YAML::Node& map) {
+      const YAML::Node type = map["type"];
+      if (type.IsDefined() && type.IsScalar()) types_[scalar_of(key)] = type.Scalar();
+      return false;
+    });
+    walk(root, 0, [&](const YAML::Node& key, const YAML::Node& map) {
+      return take(scalar_of(key), key, map);
+    });
     if (error_) return *error_;
     if (!read_.drives.empty()) return std::move(read_);
     return Error{
@@ -233,24 +241,13 @@ class YamlReader {
     return true;
   }
 
-  // "NAME: {type: T}", wherever it stands; ROS 2 keeps it under controller_manager.
-  void collect_types(const YAML::Node& node, int depth) {
+  // Every map within another, the outer ones first; what `take` takes is not looked into.
+  void walk(const YAML::Node& node, int depth,
+            const std::function<bool(const YAML::Node& key, const YAML::Node& map)>& take) {
     if (!node.IsMap() || depth > kDeepestYaml || too_many(node)) return;
     for (const auto& pair : node) {
-      if (!pair.second.IsMap()) continue;
-      const YAML::Node type = pair.second["type"];
-      if (type.IsDefined() && type.IsScalar()) types_[scalar_of(pair.first)] = type.Scalar();
-      collect_types(pair.second, depth + 1);
-    }
-  }
-
-  void collect_drives(const YAML::Node& node, int depth) {
-    if (!node.IsMap() || depth > kDeepestYaml || too_many(node)) return;
-    for (const auto& pair : node) {
-      if (!pair.second.IsMap()) continue;
-      if (!take(scalar_of(pair.first), pair.first, pair.second)) {
-        collect_drives(pair.second, depth + 1);
-      }
+      if (!pair.second.IsMap() || take(pair.first, pair.second)) continue;
+      walk(pair.second, depth + 1, take);
     }
   }
 
