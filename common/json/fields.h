@@ -159,6 +159,7 @@ class LenientFields {
   static void convert(const Json& json, Number& to) {
     if (json.is_number()) to = json.get<Number>();
   }
+  static void convert(const Json& json, Json& to) { to = json; }
   static void convert(const Json& json, bool& to) {
     if (json.is_boolean()) to = json.get<bool>();
   }

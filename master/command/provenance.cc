@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "common/json/json.h"
+#include "common/json/fields.h"
 #include "common/trials/files.h"
 
 namespace gapfarm {
@@ -10,19 +10,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string word(const Json& json, const char* key) {
-  return json.contains(key) && json[key].is_string() ? json[key].get<std::string>() : "";
-}
+constexpr auto kStamp = [](auto& v, auto& row) { FIELDS(command, problem, options, about, build); };
 
 Result<Provenance> read_stamp(const std::string& file) {
   ASSIGN_OR_RETURN(const auto text, read_text_file(file));
   const Json json = parse_json(text);
-  if (!json.is_object() || word(json, "problem").empty()) {
+  auto stamp = LenientFields::read<Provenance>(json, kStamp);
+  if (stamp.problem.empty())
     return Error{file + ": does not say what was asked; choose another --out"};
-  }
-  return Provenance{word(json, "command"), word(json, "problem"),
-                    json.value("options", Json::object()), json.value("about", Json::object()),
-                    word(json, "build")};
+  return stamp;
 }
 
 // "configs/srv1.toml, a.csv, b.csv".
@@ -50,12 +46,7 @@ std::string differing(const Json& a, const Json& b) {
 }  // namespace
 
 std::string format_stamp(const Provenance& stamp) {
-  const Json json = {{"command", stamp.command},
-                     {"problem", stamp.problem},
-                     {"options", stamp.options},
-                     {"about", stamp.about},
-                     {"build", stamp.build}};
-  return json_text(json, 2) + "\n";
+  return json_text(FieldWriter::written(stamp, kStamp), 2) + "\n";
 }
 
 Result<FolderState> compare_stamp(const std::string& folder, const std::string& result,
