@@ -13,11 +13,11 @@
 #include "common/base/text.h"
 #include "common/parameters/ground.h"
 #include "common/problem/problem.h"
-#include "common/svg/svg.h"
 #include "common/trials/text/csv.h"
 #include "master/command/inputs.h"
 #include "master/experiments/plan/drive_knowledge.h"
 #include "master/io/logs/column_map.h"
+#include "master/report/figures/figures.h"
 
 namespace gapfarm {
 namespace {
@@ -222,26 +222,25 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
 }
 
 std::string drive_picture(const DrivePlan& drive, const DriveTask& task) {
-  constexpr double kWidth = 600, kPad = 20;
-  const double per_m = (kWidth - 2 * kPad) / task.length_m;
-  Svg svg(kWidth, task.width_m * per_m + 2 * kPad);
-  const auto at = [&](const Pose& X) {
-    return SvgPoint{kPad + (X.x + task.length_m / 2) * per_m,
-                    kPad + (task.width_m / 2 - X.y) * per_m};
-  };
-  svg.rectangle({kPad, kPad}, kWidth - 2 * kPad, task.width_m * per_m, {"none", "#dddddd"});
+  const double x = task.length_m / 2, y = task.width_m / 2;
+  const auto place = [](const Pose& X) { return SvgPoint{X.x, X.y}; };
+  ChartSeries floor{"the floor", {{-x, -y}, {x, -y}, {x, y}, {-x, y}, {-x, -y}}};
+  ChartSeries headings{.name = "heading as a move ends", .arrows = true};
+  LineChart chart;
+  chart.title = "The drive";
+  chart.x_title = "x, m";
+  chart.y_title = "y, m";
+  chart.equal_axes = true;
   for (const LoggedRun& run : drive.drive.runs) {
-    std::vector<SvgPoint> points;
-    for (const PoseRow& pose : run.poses) points.push_back(at(pose.X_WM));
-    svg.polyline(points, {"none", "#0072b2", 1.5, {}, 0.9});
-    for (const PoseRow& pose : run.poses) {
-      svg.circle(at(pose.X_WM), 2.5, {"#0072b2", "none"});
-      const Pose ahead = pose.X_WM * Pose{0.03 * task.length_m, 0, 0};
-      svg.line(at(pose.X_WM), at(ahead), {"none", "#d55e00", 1.5});
+    const auto X_WM = mapped(run.poses, &PoseRow::X_WM);
+    chart.series.push_back({"run " + run.run, mapped(X_WM, place)});
+    for (const Pose& X : X_WM) {
+      headings.line.insert(headings.line.end(),
+                           {place(X), place(X * Pose{0.03 * task.length_m, 0, 0})});
     }
-    svg.circle(points.front(), 4, {"#ffffff", "#222222", 1.5});
   }
-  return svg.finish();
+  chart.series.insert(chart.series.end(), {headings, floor});
+  return line_chart(chart);
 }
 
 }  // namespace
