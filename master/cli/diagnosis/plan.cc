@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/text.h"
+#include "common/json/fields.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/trial.h"
 #include "common/trials/write.h"
@@ -125,23 +126,18 @@ std::string table_text(const plan::DesignedPlan& plan) {
   return text;
 }
 
+constexpr auto kSeen = [](auto& v, auto& row) {
+  FIELDS(effect, parameter, unit, size, like, likeness);
+};
+constexpr auto kPower = [](auto& v, auto& row) { FIELDS(trials, planned, random); };
+
 Json table_json(const plan::DesignedPlan& plan) {
-  Json rows = Json::array();
-  for (std::size_t k = 0; k < plan.seen.size(); ++k) {
-    const plan::Visibility& seen = plan.seen[k];
-    Json row = {{"effect", seen.effect},    {"parameter", seen.parameter}, {"unit", seen.unit},
-                {"size", nullptr},          {"size_random", nullptr},      {"like", seen.like},
-                {"likeness", seen.likeness}};
-    if (seen.size) row["size"] = *seen.size;
-    if (plan.seen_at_random[k].size) row["size_random"] = *plan.seen_at_random[k].size;
-    rows.push_back(std::move(row));
-  }
-  Json power = Json::array();
-  for (const plan::PowerPoint& p : plan.power) {
-    power.push_back({{"trials", p.trials}, {"planned", p.planned}, {"random", p.random}});
+  Json rows = FieldWriter::list(plan.seen, kSeen);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    rows[k]["size_random"] = number_or_null(plan.seen_at_random[k].size);
   }
   return {{"effects", rows},
-          {"power", power},
+          {"power", FieldWriter::list(plan.power, kPower)},
           {"best_share", plan.best_share},
           {"not_planned_for", plan.not_planned_for},
           {"without_shift", plan.without_shift}};
