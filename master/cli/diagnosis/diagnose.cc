@@ -276,10 +276,8 @@ SubcommandRun setup_diagnose(CLI::App& app) {
   app.add_option("--exclude,--leave-out", command->exclude,
                  "Effects that the catalogue is to be without (--leave-out is the old name)");
   app.add_option("--seed", command->seed, "Of the bootstrap");
-  command->outputs.declare(app);
-  command->farm.declare(app, true);
+  command->declare(app, LongOptions::Leaves::kFolder, true);
   command->page.declare(app);
-  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"

@@ -16,7 +16,7 @@ namespace gapfarm {
 
 inline constexpr const char* kDiagnosisFile = "diagnosis.json";
 
-struct DiagnoseCommand {
+struct DiagnoseCommand : LongOptions {
   std::string config;
   TrialOptions trials;
   std::string out;
@@ -25,8 +25,6 @@ struct DiagnoseCommand {
   std::optional<RunLog> reference_log;
   std::vector<std::string> exclude;
   std::optional<std::uint64_t> seed;
-  Outputs outputs;
-  FarmOptions farm;
   PageOption page;
 };
 
