@@ -253,14 +253,8 @@ class Determination {
                    " points about the model end well; the quadratic needs " +
                    std::to_string(terms(moving_.size()))};
     }
-    Eigen::MatrixXd offsets(usable.size(), size());
-    Eigen::VectorXd outcomes(offsets.rows());
-    for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
-      const Eigen::Index from = usable[i];
-      offsets.row(i) = design.offsets.row(from);
-      outcomes[i] = values[from];
-    }
-    return fit(offsets, outcomes, widths_);
+    const Eigen::Map<const Eigen::VectorXd> all(values.data(), design.offsets.rows());
+    return fit(design.offsets(usable, Eigen::all), all(usable), widths_);
   }
 
   // In half widths every gene counts alike, so that where one hardly matters the axes of the others
