@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 
 namespace gapfarm {
@@ -20,5 +21,17 @@ double hausdorff_distance(std::span<const PathPoint> a, std::span<const PathPoin
 // Discrete Frechet distance: the shortest leash with which both paths can be walked from end to end
 // without a step back, by dynamic programming (Eiter and Mannila 1994).
 double frechet_distance(std::span<const PathPoint> a, std::span<const PathPoint> b);
+
+using PathDistance = double (*)(std::span<const PathPoint>, std::span<const PathPoint>);
+
+struct NamedPathDistance {
+  const char* name;   // for programs
+  const char* title;  // for people
+  PathDistance distance;
+};
+inline constexpr std::array<NamedPathDistance, 3> kPathDistances = {
+    {{"frechet", "Frechet", frechet_distance},
+     {"hausdorff", "Hausdorff", hausdorff_distance},
+     {"lettier", "Lettier", lettier_distance}}};
 
 }  // namespace gapfarm

@@ -154,10 +154,10 @@ class Driving {
       ASSIGN_OR_RETURN(constant, constant_velocities(log, problem_.commands));
       ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, problem_.commands));
       const auto mover = mined_mover(mined, command_.settings);
-      RETURN_IF_ERROR(add("mined motion model", drive(*mover, constant, command_.runs), true));
+      RETURN_IF_ERROR(add("mined motion model", drive(mover, constant, command_.runs), true));
     }
     const auto mover = constant_velocity_mover(constant, command_.settings);
-    RETURN_IF_ERROR(add("constant velocity", drive(*mover, constant, 2), false));
+    RETURN_IF_ERROR(add("constant velocity", drive(mover, constant, 2), false));
     compare_targets();
     return report_;
   }
@@ -171,7 +171,7 @@ class Driving {
                  true);
     }
     const auto mover = simulated_mover(farm_, problem_, command_.settings);
-    return add("simulation", drive(*mover, nominal, command_.runs), true);
+    return add("simulation", drive(mover, nominal, command_.runs), true);
   }
 
   // `rates`: what a pilot would have measured of the robot that the mover moves.
@@ -189,7 +189,7 @@ class Driving {
     driver.name = name;
     driver.runs = *std::move(runs);
     driver.end = end_ellipse(driver.runs, command_.coverage);
-    if (spread) driver.band = PathBand::fit(driver.runs, command_.coverage);
+    if (spread) driver.band = path_band(driver.runs, command_.coverage);
     if (!task_.real.empty()) {
       driver.real = distances_to(driver.runs, task_.real, kSpacing_m);
     }
@@ -228,9 +228,9 @@ Json to_json(const DriveReport& report) {
   for (const DriverReport& d : report.drivers) {
     Json driver = {{"name", d.name}, {"runs", d.runs.size()}};
     if (d.real) {
-      driver["to_real_m"] = {{"lettier", d.real->lettier.median},
-                             {"hausdorff", d.real->hausdorff.median},
-                             {"frechet", d.real->frechet.median}};
+      for (std::size_t k = 0; k < d.real->size(); ++k) {
+        driver["to_real_m"][kPathDistances[k].name] = (*d.real)[k].median;
+      }
     }
     Json ends = Json::array();
     for (const DrivenRun& run : d.runs) {

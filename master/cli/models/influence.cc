@@ -28,10 +28,10 @@ Json to_json(const InfluenceReport& report, const ParameterTable& table) {
   for (const FactorInfluence& f : report.factors) {
     factors.push_back({{"parameter", table[f.gene.row].key},
                        {"alone_m", f.alone.distance},
-                       {"alone_at", f.alone.value},
+                       {"alone_at", f.level},
                        {"alone_p", f.alone.p},
                        {"alone_influential", f.alone.influential},
-                       {"morris_m", f.morris.mean},
+                       {"morris_m", f.morris.distance},
                        {"morris_p", f.morris.p},
                        {"morris_influential", f.morris.influential}});
   }
@@ -47,8 +47,8 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
   RETURN_IF_ERROR(
       command.outputs.plan_in(command.out, {"influence.csv", "influence.html", "genes.toml"}));
   show_notes(config.problem.log, context.console);
-  for (std::size_t i = 0; i < path_distances().size(); ++i) {
-    if (command.distance == path_distances()[i].name) command.settings.distance = i;
+  for (std::size_t i = 0; i < kPathDistances.size(); ++i) {
+    if (command.distance == kPathDistances[i].name) command.settings.distance = i;
   }
   const ParameterTable& table = config.problem.table();
   const std::vector<Gene> genes =

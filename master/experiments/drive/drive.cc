@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/random/stream.h"
 #include "master/farm/planned_trials.h"
 
@@ -61,9 +62,9 @@ CommandSpec go_to(const WaypointPilot& pilot, const Pose& X_WR, const Eigen::Vec
 template <class Choose>
 Status drive_leg(const Mover& mover, std::uint64_t leg, std::vector<Pose>& at,
                  std::vector<DrivenRun>& runs, const Choose& choose) {
-  std::vector<Mover::Start> starts;
+  std::vector<MoverStart> starts;
   for (std::size_t r = 0; r < runs.size(); ++r) starts.push_back({at[r], choose(at[r]), r, leg});
-  ASSIGN_OR_RETURN(auto legs, mover.drive(starts));
+  ASSIGN_OR_RETURN(auto legs, mover(starts));
   for (std::size_t r = 0; r < runs.size(); ++r) {
     at[r] = legs[r].path.back().pose;
     runs[r].push_back(std::move(legs[r]));
@@ -81,7 +82,7 @@ Error unknown(const CommandSpec& command, const std::string& who) {
 }
 
 // Poses at constant velocity from X_WS to X_WS X_SE.
-Leg smooth_leg(const Mover::Start& start, const Pose& X_SE, double interval_s) {
+Leg smooth_leg(const MoverStart& start, const Pose& X_SE, double interval_s) {
   Leg leg{start.command, {}};
   const double duration_s = start.command.duration_s;
   const Twist twist = log(X_SE);
@@ -93,120 +94,33 @@ Leg smooth_leg(const Mover::Start& start, const Pose& X_SE, double interval_s) {
   return leg;
 }
 
-class ConstantVelocityMover final : public Mover {
- public:
-  ConstantVelocityMover(std::vector<ConstantVelocity> models, const DriveSettings& settings)
-      : models_(std::move(models)), settings_(settings) {}
-
-  Result<std::vector<Leg>> drive(std::span<const Start> starts) const override {
-    std::vector<Leg> legs;
-    for (const Start& start : starts) {
-      const auto model = std::ranges::find_if(
-          models_, [&](const auto& m) { return same_duties(m.command, start.command); });
-      if (model == models_.end()) return unknown(start.command, "the constant-velocity model");
-      const double t = start.command.duration_s;
-      const Pose X_SE = exp({model->speed_m_s * t, 0, model->turn_rad_s * t});
-      legs.push_back(smooth_leg(start, X_SE, settings_.interval_s));
-    }
-    return legs;
+// Of the same name and duties, the one whose duration is closest.
+const CommandMotion* closest(const std::vector<CommandMotion>& motions,
+                             const CommandSpec& command) {
+  const CommandMotion* found = nullptr;
+  for (const CommandMotion& motion : motions) {
+    if (!same_duties(motion.command, command)) continue;
+    const auto off = [&](const CommandMotion& m) {
+      return std::abs(m.command.duration_s - command.duration_s);
+    };
+    if (found == nullptr || off(motion) < off(*found)) found = &motion;
   }
+  return found;
+}
 
- private:
-  std::vector<ConstantVelocity> models_;
-  DriveSettings settings_;
-};
-
-class MinedMover final : public Mover {
- public:
-  MinedMover(const MotionModel& model, const DriveSettings& settings) : settings_(settings) {
-    for (const CommandMotion& motion : model.commands()) {
-      if (motion.trials >= MotionModelSettings{}.least_trials) motions_.push_back(motion);
-    }
-  }
-
-  Result<std::vector<Leg>> drive(std::span<const Start> starts) const override {
-    std::vector<Leg> legs;
-    for (const Start& start : starts) {
-      const CommandMotion* motion = closest(start.command);
-      if (motion == nullptr) return unknown(start.command, "the mined motion model");
-      const double share = start.command.duration_s / motion->command.duration_s;
-      const Eigen::Matrix3d covariance = share * motion->motion.covariance;
-      Stream stream({settings_.seed, Purpose::kSimulation, start.leg, start.run});
-      const Eigen::Vector3d draw(stream.normal(), stream.normal(), stream.normal());
-      const Eigen::Vector3d off = covariance.llt().matrixL() * draw;
-      const Pose mean = exp(share * log(motion->motion.mean));
-      const Pose X_SE{mean.x + off.x(), mean.y + off.y(), wrap_angle(mean.theta + off.z())};
-      legs.push_back(smooth_leg(start, X_SE, settings_.interval_s));
-    }
-    return legs;
-  }
-
- private:
-  // Of the same name and duties, the one whose duration is closest.
-  const CommandMotion* closest(const CommandSpec& command) const {
-    const CommandMotion* found = nullptr;
-    for (const CommandMotion& motion : motions_) {
-      if (!same_duties(motion.command, command)) continue;
-      const auto off = [&](const CommandMotion& m) {
-        return std::abs(m.command.duration_s - command.duration_s);
-      };
-      if (found == nullptr || off(motion) < off(*found)) found = &motion;
-    }
-    return found;
-  }
-
-  std::vector<CommandMotion> motions_;
-  DriveSettings settings_;
-};
-
-class SimulatedMover final : public Mover {
- public:
-  SimulatedMover(Farm& farm, const Problem& problem, const DriveSettings& settings)
-      : farm_(farm), settings_(settings) {
-    Problem bare = problem;
-    bare.log = {};
-    bare.genes.clear();
-    // The pilot's camera is not what varies: the true pose is asked for.
-    for (const char* key : {"pose_noise_position", "pose_noise_heading"}) {
-      if (const auto row = bare.table().find(key)) bare.values[*row] = bare.table()[*row].lower;
-    }
-    hash_ = farm_.add_problem(to_proto(bare));
-  }
-
-  Result<std::vector<Leg>> drive(std::span<const Start> starts) const override {
-    std::vector<v1::Task> tasks;
-    for (const Start& start : starts) {
-      v1::Task task;
-      v1::SimulateTask* simulate = task.mutable_simulate();
-      simulate->mutable_stream()->set_run_seed(settings_.seed);
-      simulate->mutable_stream()->set_generation(start.leg);
-      simulate->mutable_stream()->set_birth_id(start.run);
-      simulate->set_path_interval(settings_.interval_s);
-      v1::PlannedTrial* planned = simulate->add_plan();
-      planned->set_moved(true);
-      *planned->mutable_trial() =
-          to_proto(planned_leg(start.command, start.leg, 0, start.X_WS, settings_));
-      tasks.push_back(std::move(task));
-    }
-    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
-    std::vector<Leg> legs;
-    for (std::size_t i = 0; i < starts.size(); ++i) {
-      const v1::TaskResult& result = results[i];
-      if (result.outcome() != v1::OK || result.simulate().trials_size() != 1) {
-        return Error{"command '" + starts[i].command.name + "' ended with " +
-                     v1::Outcome_Name(result.outcome()) + " " + result.message()};
-      }
-      legs.push_back({starts[i].command, from_proto(result.simulate().trials(0)).path});
-      move_path(settings_.frame_x_m, settings_.frame_y_m, &legs.back().path);
-    }
-    return legs;
-  }
-
- private:
-  Farm& farm_;
-  DriveSettings settings_;
-  std::string hash_;
-};
+v1::Task leg_task(const MoverStart& start, const DriveSettings& settings) {
+  v1::Task task;
+  v1::SimulateTask* simulate = task.mutable_simulate();
+  simulate->mutable_stream()->set_run_seed(settings.seed);
+  simulate->mutable_stream()->set_generation(start.leg);
+  simulate->mutable_stream()->set_birth_id(start.run);
+  simulate->set_path_interval(settings.interval_s);
+  v1::PlannedTrial* planned = simulate->add_plan();
+  planned->set_moved(true);
+  *planned->mutable_trial() =
+      to_proto(planned_leg(start.command, start.leg, 0, start.X_WS, settings));
+  return task;
+}
 
 }  // namespace
 
@@ -317,18 +231,68 @@ Result<std::vector<DrivenRun>> drive_waypoints(const Mover& mover, const Waypoin
   return driven;
 }
 
-std::unique_ptr<Mover> simulated_mover(Farm& farm, const Problem& problem,
-                                       const DriveSettings& settings) {
-  return std::make_unique<SimulatedMover>(farm, problem, settings);
+Mover simulated_mover(Farm& farm, const Problem& problem, const DriveSettings& settings) {
+  Problem bare = problem;
+  bare.log = {};
+  bare.genes.clear();
+  // The pilot's camera is not what varies: the true pose is asked for.
+  for (const char* key : {"pose_noise_position", "pose_noise_heading"}) {
+    if (const auto row = bare.table().find(key)) bare.values[*row] = bare.table()[*row].lower;
+  }
+  return [&farm, settings, hash = farm.add_problem(to_proto(bare))](
+             std::span<const MoverStart> starts) -> Result<std::vector<Leg>> {
+    const auto tasks = mapped(starts, [&](const MoverStart& s) { return leg_task(s, settings); });
+    ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
+    std::vector<Leg> legs;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      const v1::TaskResult& result = results[i];
+      if (result.outcome() != v1::OK || result.simulate().trials_size() != 1) {
+        return Error{"command '" + starts[i].command.name + "' ended with " +
+                     v1::Outcome_Name(result.outcome()) + " " + result.message()};
+      }
+      legs.push_back({starts[i].command, from_proto(result.simulate().trials(0)).path});
+      move_path(settings.frame_x_m, settings.frame_y_m, &legs.back().path);
+    }
+    return legs;
+  };
 }
 
-std::unique_ptr<Mover> constant_velocity_mover(std::vector<ConstantVelocity> models,
-                                               const DriveSettings& settings) {
-  return std::make_unique<ConstantVelocityMover>(std::move(models), settings);
+Mover constant_velocity_mover(std::vector<ConstantVelocity> models, const DriveSettings& settings) {
+  return [models, settings](std::span<const MoverStart> starts) -> Result<std::vector<Leg>> {
+    std::vector<Leg> legs;
+    for (const MoverStart& start : starts) {
+      const auto model = std::ranges::find_if(
+          models, [&](const auto& m) { return same_duties(m.command, start.command); });
+      if (model == models.end()) return unknown(start.command, "the constant-velocity model");
+      const double t = start.command.duration_s;
+      const Pose X_SE = exp({model->speed_m_s * t, 0, model->turn_rad_s * t});
+      legs.push_back(smooth_leg(start, X_SE, settings.interval_s));
+    }
+    return legs;
+  };
 }
 
-std::unique_ptr<Mover> mined_mover(const MotionModel& model, const DriveSettings& settings) {
-  return std::make_unique<MinedMover>(model, settings);
+Mover mined_mover(const MotionModel& model, const DriveSettings& settings) {
+  std::vector<CommandMotion> motions;
+  for (const CommandMotion& motion : model.commands()) {
+    if (motion.trials >= MotionModelSettings{}.least_trials) motions.push_back(motion);
+  }
+  return [motions, settings](std::span<const MoverStart> starts) -> Result<std::vector<Leg>> {
+    std::vector<Leg> legs;
+    for (const MoverStart& start : starts) {
+      const CommandMotion* motion = closest(motions, start.command);
+      if (motion == nullptr) return unknown(start.command, "the mined motion model");
+      const double share = start.command.duration_s / motion->command.duration_s;
+      const Eigen::Matrix3d covariance = share * motion->motion.covariance;
+      Stream stream({settings.seed, Purpose::kSimulation, start.leg, start.run});
+      const Eigen::Vector3d draw(stream.normal(), stream.normal(), stream.normal());
+      const Eigen::Vector3d off = covariance.llt().matrixL() * draw;
+      const Pose mean = exp(share * log(motion->motion.mean));
+      const Pose X_SE{mean.x + off.x(), mean.y + off.y(), wrap_angle(mean.theta + off.z())};
+      legs.push_back(smooth_leg(start, X_SE, settings.interval_s));
+    }
+    return legs;
+  };
 }
 
 }  // namespace gapfarm

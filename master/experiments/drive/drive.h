@@ -2,7 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <memory>
+#include <array>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,18 +24,14 @@ struct Leg {
 };
 using DrivenRun = std::vector<Leg>;
 
-// Drives one command in every run, each from where it stands.
-class Mover {
- public:
-  struct Start {
-    Pose X_WS;
-    CommandSpec command;
-    std::uint64_t run = 0, leg = 0;  // name the draw of noise
-  };
-  virtual ~Mover() = default;
-  // One leg a start, in their order.  Errors: a command that the mover does not know, of the farm.
-  virtual Result<std::vector<Leg>> drive(std::span<const Start> starts) const = 0;
+// Drives one command in every run, each from where it stands: one leg a start, in their order.
+// Errors: a command that the mover does not know, of the farm.
+struct MoverStart {
+  Pose X_WS;
+  CommandSpec command;
+  std::uint64_t run = 0, leg = 0;  // name the draw of noise
 };
+using Mover = std::function<Result<std::vector<Leg>>(std::span<const MoverStart> starts)>;
 
 struct DriveSettings {
   std::uint64_t seed = 1;
@@ -45,14 +42,12 @@ struct DriveSettings {
 
 // The simulation with its drive noise; poses are the true ones, without the camera's noise.
 // `farm` and `problem` outlive it.
-std::unique_ptr<Mover> simulated_mover(Farm& farm, const Problem& problem,
-                                       const DriveSettings& settings);
+Mover simulated_mover(Farm& farm, const Problem& problem, const DriveSettings& settings);
 // Constant speed and turn rate; no spread.
-std::unique_ptr<Mover> constant_velocity_mover(std::vector<ConstantVelocity> models,
-                                               const DriveSettings& settings);
+Mover constant_velocity_mover(std::vector<ConstantVelocity> models, const DriveSettings& settings);
 // Ends drawn from the mined distributions, straight or circular paths between; a command that lasts
 // longer or shorter than the mined one has its mean and covariance scaled with time.
-std::unique_ptr<Mover> mined_mover(const MotionModel& model, const DriveSettings& settings);
+Mover mined_mover(const MotionModel& model, const DriveSettings& settings);
 
 // Constant velocities of the model itself: its nominal motions of the commands.
 Result<std::vector<ConstantVelocity>> nominal_velocities(Farm& farm, const Problem& problem);
@@ -106,19 +101,10 @@ struct BandPoint {
 // of the runs; one factor, from the other half's greatest excursions, widens it until it holds
 // enough of them (split conformal; Lei et al., JASA 2018), so that it is not fitted to what it is
 // judged by.
-class PathBand {
- public:
-  // REQUIRES: at least 4 runs with the same legs, coverage in (0, 1).
-  static PathBand fit(std::span<const DrivenRun> runs, double coverage, unsigned points_a_leg = 20);
-
-  const std::vector<BandPoint>& points() const { return points_; }
-  // Greatest excursion of a run in units of the band: at most 1 when all of it lies inside.
-  double excursion(const DrivenRun& run) const;
-
- private:
-  std::vector<BandPoint> points_;
-  unsigned points_a_leg_ = 0;
-};
+// REQUIRES: at least 4 runs with the same legs, coverage in (0, 1).
+std::vector<BandPoint> path_band(std::span<const DrivenRun> runs, double coverage);
+// Greatest excursion of a run in units of the band: at most 1 when all of it lies inside.
+double excursion(const std::vector<BandPoint>& band, const DrivenRun& run);
 
 // Where runs end: mean, and the ellipse of x and y that holds `coverage` of a normal distribution.
 struct EndEllipse {
@@ -141,17 +127,15 @@ struct RunDistance {
   Interval middle_90;  // 5 % and 95 %
 };
 
-// Distances of one driver's runs to a real path.
-struct RealDistances {
-  RunDistance lettier, hausdorff, frechet;
-};
+// Of one driver's runs to a real path, by each of kPathDistances.
+using RealDistances = std::array<RunDistance, kPathDistances.size()>;
 RealDistances distances_to(std::span<const DrivenRun> runs, std::span<const PathPoint> real,
                            double spacing_m);
 
 struct DriverReport {
   std::string name;  // "simulation", "constant velocity", ...
   std::vector<DrivenRun> runs;
-  std::optional<PathBand> band;  // none for a driver without spread
+  std::vector<BandPoint> band;  // empty for a driver without spread
   EndEllipse end;
   std::optional<RealDistances> real;
 };

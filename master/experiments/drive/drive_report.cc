@@ -29,9 +29,8 @@ LineChart floor_chart(const DriveReport& report) {
   }
   for (const DriverReport& driver : report.drivers) {
     ChartSeries series{.name = driver.name};
-    if (driver.band) {
-      for (const BandPoint& p : driver.band->points())
-        series.line.push_back({p.middle.x, p.middle.y});
+    if (!driver.band.empty()) {
+      for (const BandPoint& p : driver.band) series.line.push_back({p.middle.x, p.middle.y});
     } else {
       series.line = drawn(floor_path(driver.runs.front(), 0.005));
     }
@@ -59,9 +58,9 @@ LineChart band_chart(const DriveReport& report, int coordinate) {
   chart.x_title = "legs driven";
   chart.y_title = kTitles[coordinate];
   for (const DriverReport& driver : report.drivers) {
-    if (!driver.band) continue;
+    if (driver.band.empty()) continue;
     ChartSeries series{.name = driver.name};
-    for (const BandPoint& p : driver.band->points()) {
+    for (const BandPoint& p : driver.band) {
       const double at = static_cast<double>(p.leg) + p.share;
       const double middle = coordinate == 0 ? p.middle.x : coordinate == 1 ? p.middle.y : 0;
       series.line.push_back({at, middle});
@@ -78,14 +77,9 @@ std::string distance_text(const RunDistance& distance) {
                      distance.middle_90.upper);
 }
 
-std::vector<std::string> real_cells(const std::optional<RealDistances>& real) {
-  if (!real) return {"–", "–", "–"};
-  return {distance_text(real->frechet), distance_text(real->hausdorff),
-          distance_text(real->lettier)};
-}
-
 // A band is never thinner: m and rad.
 constexpr double kThinnest = 1e-6;
+constexpr unsigned kPointsALeg = 20;
 
 Pose pose_at(const std::vector<PathSample>& path, double t_s) {
   const auto after = std::lower_bound(path.begin(), path.end(), t_s,
@@ -138,17 +132,14 @@ BandPoint shape_at(const std::vector<std::vector<GridPoint>>& paths, std::size_t
 
 RealDistances distances_to(std::span<const DrivenRun> runs, std::span<const PathPoint> real,
                            double spacing_m) {
-  std::vector<double> lettier, hausdorff, frechet;
-  for (const DrivenRun& run : runs) {
-    const std::vector<PathPoint> path = floor_path(run, spacing_m);
-    lettier.push_back(lettier_distance(path, real));
-    hausdorff.push_back(hausdorff_distance(path, real));
-    frechet.push_back(frechet_distance(path, real));
+  const auto paths = mapped(runs, [&](const DrivenRun& run) { return floor_path(run, spacing_m); });
+  RealDistances found;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const auto far =
+        mapped(paths, [&](const auto& path) { return kPathDistances[k].distance(path, real); });
+    found[k] = {median(far), {quantile(far, 0.05), quantile(far, 0.95)}};
   }
-  const auto over_runs = [](const std::vector<double>& v) {
-    return RunDistance{median(v), {quantile(v, 0.05), quantile(v, 0.95)}};
-  };
-  return {over_runs(lettier), over_runs(hausdorff), over_runs(frechet)};
+  return found;
 }
 
 std::string drive_text(const DriveReport& report) {
@@ -159,7 +150,7 @@ std::string drive_text(const DriveReport& report) {
                         driver.runs.front().size());
     text += fmt::format("  ends at x {:.4f} m, y {:.4f} m, heading {:.4f} rad", end.mean.x,
                         end.mean.y, end.mean.theta);
-    if (driver.band) {
+    if (!driver.band.empty()) {
       text += fmt::format(
           "; {:.0f} % ellipse: half axes {:.1f} mm and {:.1f} mm, long one at {:.2f} rad; heading "
           "s.d. {:.3f} rad",
@@ -168,17 +159,22 @@ std::string drive_text(const DriveReport& report) {
     }
     text += "\n";
     if (driver.real) {
-      text += fmt::format(
-          "  from the real path, m, median (5 % to 95 %): Frechet {}, Hausdorff {}, Lettier {}\n",
-          distance_text(driver.real->frechet), distance_text(driver.real->hausdorff),
-          distance_text(driver.real->lettier));
+      text += "  from the real path, m, median (5 % to 95 %)";
+      for (std::size_t k = 0; k < driver.real->size(); ++k) {
+        text += fmt::format("{} {} {}", k == 0 ? ":" : ",", kPathDistances[k].title,
+                            distance_text((*driver.real)[k]));
+      }
+      text += "\n";
     }
   }
   if (report.real_to_targets) {
-    text += fmt::format(
-        "straight lines between the way-points\n  from the real path, m: Frechet {:.3g}, Hausdorff "
-        "{:.3g}\n",
-        report.real_to_targets->frechet.median, report.real_to_targets->hausdorff.median);
+    text += "straight lines between the way-points\n  from the real path, m";
+    // Lettier's means nothing of what nobody drove in time.
+    for (std::size_t k = 0; k + 1 < report.real_to_targets->size(); ++k) {
+      text += fmt::format("{} {} {:.3g}", k == 0 ? ":" : ",", kPathDistances[k].title,
+                          (*report.real_to_targets)[k].median);
+    }
+    text += "\n";
   }
   return text;
 }
@@ -186,8 +182,7 @@ std::string drive_text(const DriveReport& report) {
 std::string band_csv(const DriveReport& report) {
   std::string text = "driver,leg,share,x,y,theta,x_low,x_high,y_low,y_high,theta_low,theta_high\n";
   for (const DriverReport& driver : report.drivers) {
-    if (!driver.band) continue;
-    for (const BandPoint& p : driver.band->points()) {
+    for (const BandPoint& p : driver.band) {
       const Pose& m = p.middle;
       text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", driver.name, p.leg + 1, p.share,
                           m.x, m.y, m.theta, m.x - p.below[0], m.x + p.above[0], m.y - p.below[1],
@@ -221,8 +216,9 @@ std::string drive_page(const DriveReport& report, const std::string& title) {
                     fmt::format("{:.4f}", end.mean.theta),
                     fmt::format("{:.1f} by {:.1f}", 1e3 * end.major_m, 1e3 * end.minor_m),
                     fmt::format("{:.3f}", end.heading_deviation_rad)});
-    const auto cells = real_cells(driver.real);
-    rows.back().insert(rows.back().end(), cells.begin(), cells.end());
+    for (std::size_t k = 0; k < kPathDistances.size(); ++k) {
+      rows.back().push_back(driver.real ? distance_text((*driver.real)[k]) : "–");
+    }
   }
   page.table({"driver", "runs", "x, m", "y, m", "heading, rad",
               fmt::format("{:.0f} % ellipse, half axes, mm", 100 * report.coverage),
@@ -252,32 +248,31 @@ std::vector<GridPoint> on_grid(const DrivenRun& run, unsigned points_a_leg) {
   return grid;
 }
 
-PathBand PathBand::fit(std::span<const DrivenRun> runs, double coverage, unsigned points_a_leg) {
+std::vector<BandPoint> path_band(std::span<const DrivenRun> runs, double coverage) {
   assert(runs.size() >= 4);
   std::vector<std::vector<GridPoint>> shaping, judging;
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    (r % 2 == 0 ? shaping : judging).push_back(on_grid(runs[r], points_a_leg));
+    (r % 2 == 0 ? shaping : judging).push_back(on_grid(runs[r], kPointsALeg));
   }
-  PathBand band;
-  band.points_a_leg_ = points_a_leg;
+  std::vector<BandPoint> band;
   for (std::size_t i = 0; i < shaping.front().size(); ++i) {
-    band.points_.push_back(shape_at(shaping, i));
+    band.push_back(shape_at(shaping, i));
   }
   std::vector<double> excursions;
-  for (const auto& path : judging) excursions.push_back(excursion_of(band.points_, path));
+  for (const auto& path : judging) excursions.push_back(excursion_of(band, path));
   std::ranges::sort(excursions);
   const auto n = static_cast<double>(excursions.size());
   const double rank = std::clamp(std::ceil((n + 1) * coverage), 1.0, n);
   const double factor = excursions[static_cast<std::size_t>(rank) - 1];
-  for (BandPoint& point : band.points_) {
+  for (BandPoint& point : band) {
     point.below *= factor;
     point.above *= factor;
   }
   return band;
 }
 
-double PathBand::excursion(const DrivenRun& run) const {
-  return excursion_of(points_, on_grid(run, points_a_leg_));
+double excursion(const std::vector<BandPoint>& band, const DrivenRun& run) {
+  return excursion_of(band, on_grid(run, kPointsALeg));
 }
 
 EndEllipse end_ellipse(std::span<const DrivenRun> runs, double coverage) {

@@ -27,11 +27,11 @@ class InfluenceStudy {
         problem_(problem),
         genes_(genes),
         settings_(settings),
-        distance_(path_distances()[settings.distance].distance),
+        distance_(kPathDistances[settings.distance].distance),
         hooks_(hooks) {}
 
   Result<InfluenceReport> run() {
-    for (const Gene& gene : genes_) report_.factors.push_back({gene, {}, {}});
+    for (const Gene& gene : genes_) report_.factors.push_back({gene});
     plan();
     RETURN_IF_ERROR(standard());
     RETURN_IF_ERROR(one_at_a_time());
@@ -148,21 +148,26 @@ class InfluenceStudy {
         }
       }
       ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
-      p.push_back(judge_levels(levels, sets, factor.alone));
+      p.push_back(judge_levels(levels, sets, factor));
     }
+    adjust(p, &FactorInfluence::alone);
+    return {};
+  }
+
+  void adjust(const std::vector<double>& p, Influence FactorInfluence::*of) {
     const std::vector<double> adjusted = holm(p);
     for (std::size_t f = 0; f < p.size(); ++f) {
-      OneAtATime& alone = report_.factors[f].alone;
-      alone.p = adjusted[f];
-      alone.influential = alone.p < settings_.alpha;
+      Influence& to = report_.factors[f].*of;
+      to.p = adjusted[f];
+      to.influential = to.p < settings_.alpha;
     }
-    return {};
   }
 
   // Fills in the level that moves furthest; returns the p of the best level times their number.
   double judge_levels(const std::vector<double>& levels, const std::vector<PathSet>& sets,
-                      OneAtATime& alone) const {
+                      FactorInfluence& factor) const {
     double least_p = 1;
+    Influence& alone = factor.alone;
     alone.distance = -1;
     for (std::size_t l = 0; l < levels.size(); ++l) {
       std::vector<double> distances;
@@ -178,7 +183,7 @@ class InfluenceStudy {
       if (middle <= alone.distance) continue;
       alone.distance = middle;
       alone.distance_95 = median_interval(distances, 0.95);
-      alone.value = levels[l];
+      factor.level = levels[l];
     }
     alone.distance = std::max(alone.distance, 0.0);
     return std::min(1.0, least_p * static_cast<double>(std::max<std::size_t>(levels.size(), 1)));
@@ -238,16 +243,12 @@ class InfluenceStudy {
     for (std::size_t f = 0; f < k; ++f) {
       const bool further = !steps[f].empty() && median(steps[f]) > median(noise) + kLeast_m;
       p.push_back(further ? mann_whitney(steps[f], noise).p : 1);
-      summarise_steps(steps[f], f, report_.factors[f].morris);
+      summarise_steps(steps[f], f, report_.factors[f]);
     }
-    const std::vector<double> adjusted = holm(p);
-    for (std::size_t f = 0; f < k; ++f) {
-      report_.factors[f].morris.p = adjusted[f];
-      report_.factors[f].morris.influential = adjusted[f] < settings_.alpha;
-    }
+    adjust(p, &FactorInfluence::morris);
   }
 
-  void summarise_steps(const std::vector<double>& steps, std::size_t f, MorrisEffect& to) const {
+  void summarise_steps(const std::vector<double>& steps, std::size_t f, FactorInfluence& to) const {
     if (steps.empty()) return;
     const auto mean = [&](std::span<const std::size_t> members) {
       double sum = 0;
@@ -260,11 +261,11 @@ class InfluenceStudy {
       blocks.push_back({i});
       all.push_back(i);
     }
-    to.mean = mean(all);
-    for (const double step : steps) to.deviation += (step - to.mean) * (step - to.mean);
-    to.deviation = std::sqrt(to.deviation / static_cast<double>(steps.size()));
+    const double middle = to.morris.distance = mean(all);
+    for (const double step : steps) to.sigma += (step - middle) * (step - middle);
+    to.sigma = std::sqrt(to.sigma / static_cast<double>(steps.size()));
     Stream stream({settings_.trace.seed, Purpose::kStatistics, 2, f});
-    to.mean_95 = bootstrap_interval(blocks, mean, 0.95, kBootstrap, stream);
+    to.morris.distance_95 = bootstrap_interval(blocks, mean, 0.95, kBootstrap, stream);
   }
 
   Farm& farm_;

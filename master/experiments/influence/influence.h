@@ -62,15 +62,6 @@ Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
                                          const TraceSettings& settings,
                                          std::span<const TraceRequest> requests);
 
-using PathDistance = double (*)(std::span<const PathPoint>, std::span<const PathPoint>);
-
-// Rows of a table: lettier, hausdorff, frechet.
-struct PathDistanceRow {
-  const char* name;
-  PathDistance distance;
-};
-std::span<const PathDistanceRow> path_distances();
-
 // Mean over the commands, of the first `samples` points of each path.  REQUIRES: both ok.
 double set_distance(const PathSet& a, const PathSet& b, PathDistance distance, std::size_t samples);
 
@@ -85,7 +76,7 @@ struct InfluenceSettings {
   double alpha = 0.05;              // of the tests
   std::optional<double> horizon_s;  // none: found
   double chaos_share = 0.05;  // of the path's extent that repeats may differ by at the horizon
-  std::size_t distance = 2;   // row of path_distances()
+  std::size_t distance = 0;   // row of kPathDistances
 };
 
 // What the repeats of the standard say about comparing paths at all.
@@ -95,28 +86,24 @@ struct HorizonPoint {
   double extent = 0;           // of the standard's path, m
 };
 
-struct OneAtATime {
-  double value = 0;       // level that moves the path furthest
-  double distance = 0;    // median over repeats, m
-  Interval distance_95;   // distribution-free, of the median
-  unsigned failures = 0;  // runs at any level that did not end well
-  double p = 1;           // of the level's distances against the repeats', adjusted
-  bool influential = false;
-};
-
-struct MorrisEffect {
-  double mean = 0;       // mu*: mean distance that a step of two thirds of the range moves the path
-  Interval mean_95;      // bootstrap over trajectories
-  double deviation = 0;  // sigma: great where the effect depends on the other parameters
-  unsigned failures = 0;
-  double p = 1;
+// How far a parameter moves the path by one of the methods, m.
+struct Influence {
+  // Alone: median over repeats, of the level that moves it furthest.  Morris: mu*, the mean of
+  // steps of two thirds of the range.
+  double distance = 0;
+  Interval distance_95;   // alone: distribution-free; Morris: bootstrap over trajectories
+  unsigned failures = 0;  // runs that did not end well, at any level
+  double p = 1;           // against repeats, adjusted
   bool influential = false;
 };
 
 struct FactorInfluence {
   Gene gene;
-  OneAtATime alone;
-  MorrisEffect morris;
+  Influence alone = {}, morris = {};
+  double level = 0;  // that alone moves the path furthest
+  double sigma = 0;  // Morris: great where the effect depends on the other parameters
+
+  bool influential() const { return alone.influential || morris.influential; }
 };
 
 struct InfluenceReport {

@@ -2,6 +2,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "master/experiments/influence/influence.h"
 #include "master/report/figures/figures.h"
@@ -31,19 +32,17 @@ std::string toml_value(const ParameterTable& table, std::size_t row, double valu
 }
 
 std::vector<ChartBar> bars_of(const InfluenceReport& report, const ParameterTable& table,
-                              bool morris) {
+                              Influence FactorInfluence::*method) {
   std::vector<ChartBar> bars;
   for (const FactorInfluence& factor : report.factors) {
-    const Interval& interval = morris ? factor.morris.mean_95 : factor.alone.distance_95;
-    const double value = morris ? factor.morris.mean : factor.alone.distance;
-    if (value >= 1e5) continue;  // no bar is that long
-    const bool known = std::isfinite(interval.lower);
-    bars.push_back({table[factor.gene.row].key, value, known ? interval.lower : value,
-                    known ? std::min(interval.upper, 1e5) : value,
-                    morris ? factor.morris.influential : factor.alone.influential});
+    const Influence& of = factor.*method;
+    if (of.distance >= 1e5) continue;  // no bar is that long
+    const bool known = std::isfinite(of.distance_95.lower);
+    bars.push_back({table[factor.gene.row].key, of.distance,
+                    known ? of.distance_95.lower : of.distance,
+                    known ? std::min(of.distance_95.upper, 1e5) : of.distance, of.influential});
   }
-  std::ranges::stable_sort(bars,
-                           [](const ChartBar& a, const ChartBar& b) { return a.value > b.value; });
+  std::ranges::stable_sort(bars, std::greater<>(), &ChartBar::value);
   return bars;
 }
 
@@ -58,15 +57,12 @@ std::string influence_text(const InfluenceReport& report, const ParameterTable& 
   for (const FactorInfluence& f : report.factors) {
     text += fmt::format("{:<24} {:>9} {:>20} {:>9.3g} {:>8.1g} {} {:>9} {:>20} {:>9} {:>8.1g} {}\n",
                         table[f.gene.row].key, distance_text(f.alone.distance),
-                        interval_text(f.alone.distance_95), f.alone.value, f.alone.p,
-                        f.alone.influential ? '*' : ' ', distance_text(f.morris.mean),
-                        interval_text(f.morris.mean_95), distance_text(f.morris.deviation),
-                        f.morris.p, f.morris.influential ? '*' : ' ');
+                        interval_text(f.alone.distance_95), f.level, f.alone.p,
+                        f.alone.influential ? '*' : ' ', distance_text(f.morris.distance),
+                        interval_text(f.morris.distance_95), distance_text(f.sigma), f.morris.p,
+                        f.morris.influential ? '*' : ' ');
   }
-  const auto moves = [](const FactorInfluence& f) {
-    return f.alone.influential || f.morris.influential;
-  };
-  if (std::ranges::none_of(report.factors, moves)) {
+  if (std::ranges::none_of(report.factors, &FactorInfluence::influential)) {
     return text +
            "\nnone is shown to move the path further than repeats do (5 % over all "
            "parameters), so genes.toml is empty; more --repeats and --trajectories show more\n";
@@ -81,12 +77,12 @@ std::string influence_csv(const InfluenceReport& report, const ParameterTable& t
       "p,morris_influential,morris_failures,repeat_distance_m,horizon_s\n";
   for (const FactorInfluence& f : report.factors) {
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-                        table[f.gene.row].key, f.gene.lower, f.gene.upper, f.alone.value,
+                        table[f.gene.row].key, f.gene.lower, f.gene.upper, f.level,
                         f.alone.distance, f.alone.distance_95.lower, f.alone.distance_95.upper,
-                        f.alone.p, f.alone.influential ? 1 : 0, f.alone.failures, f.morris.mean,
-                        f.morris.mean_95.lower, f.morris.mean_95.upper, f.morris.deviation,
-                        f.morris.p, f.morris.influential ? 1 : 0, f.morris.failures,
-                        report.repeat_distance, report.horizon_s);
+                        f.alone.p, f.alone.influential ? 1 : 0, f.alone.failures, f.morris.distance,
+                        f.morris.distance_95.lower, f.morris.distance_95.upper, f.sigma, f.morris.p,
+                        f.morris.influential ? 1 : 0, f.morris.failures, report.repeat_distance,
+                        report.horizon_s);
   }
   return text;
 }
@@ -98,7 +94,7 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
       "Distances between paths ({}) over the first {} s. A parameter counts as influential when it "
       "moves the path further than repeating the run does: Mann-Whitney test, adjusted by Holm "
       "over the parameters, level {}.",
-      path_distances()[settings.distance].name, number_text(report.horizon_s), settings.alpha));
+      kPathDistances[settings.distance].name, number_text(report.horizon_s), settings.alpha));
   page.heading("How far ahead paths can be compared");
   page.paragraph(
       "Tiny differences at the start grow with every collision. Beyond the horizon repeats of the "
@@ -118,22 +114,24 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
   growth.series = {apart, allowed};
   page.picture(line_chart(growth), growth.title);
   page.heading("One parameter at a time");
-  page.picture(bar_chart("Furthest level of each parameter", "m from the standard's path, median",
-                         bars_of(report, table, false), report.repeat_distance, "repeats"),
-               "bars of distances, the influential ones filled");
+  page.picture(
+      bar_chart("Furthest level of each parameter", "m from the standard's path, median",
+                bars_of(report, table, &FactorInfluence::alone), report.repeat_distance, "repeats"),
+      "bars of distances, the influential ones filled");
   page.heading("Morris: one parameter a step, all over the box");
   page.picture(bar_chart("Mean distance a step of two thirds of the range moves the path", "m",
-                         bars_of(report, table, true), report.box_repeat_distance, "repeats"),
+                         bars_of(report, table, &FactorInfluence::morris),
+                         report.box_repeat_distance, "repeats"),
                "bars of mean distances, the influential ones filled");
   page.heading("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const FactorInfluence& f : report.factors) {
     rows.push_back({table[f.gene.row].key, gene_range(f.gene, table),
-                    table.format(f.gene.row, f.alone.value), distance_text(f.alone.distance),
+                    table.format(f.gene.row, f.level), distance_text(f.alone.distance),
                     interval_text(f.alone.distance_95), p_text(f.alone.p),
-                    f.alone.influential ? "yes" : "no", distance_text(f.morris.mean),
-                    interval_text(f.morris.mean_95), distance_text(f.morris.deviation),
-                    p_text(f.morris.p), f.morris.influential ? "yes" : "no",
+                    f.alone.influential ? "yes" : "no", distance_text(f.morris.distance),
+                    interval_text(f.morris.distance_95), distance_text(f.sigma), p_text(f.morris.p),
+                    f.morris.influential ? "yes" : "no",
                     std::to_string(f.alone.failures + f.morris.failures)});
   }
   page.table({"parameter", "range", "furthest at", "m", "95 %", "p", "influential", "Morris m",
@@ -146,7 +144,7 @@ std::string influential_genes(const InfluenceReport& report, const ParameterTabl
   std::string text =
       "# Parameters that move the path further than repeats do, most influential first.\n[genes]\n";
   for (const FactorInfluence& f : report.factors) {
-    if (!f.alone.influential && !f.morris.influential) continue;
+    if (!f.influential()) continue;
     const Parameter& parameter = table[f.gene.row];
     std::string range = "[" + toml_value(table, f.gene.row, f.gene.lower) + ", " +
                         toml_value(table, f.gene.row, f.gene.upper) + "]";

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "common/base/ranges.h"
@@ -96,13 +95,6 @@ Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
     }
   }
   return sets;
-}
-
-std::span<const PathDistanceRow> path_distances() {
-  static constexpr std::array<PathDistanceRow, 3> rows = {{{"lettier", lettier_distance},
-                                                           {"hausdorff", hausdorff_distance},
-                                                           {"frechet", frechet_distance}}};
-  return rows;
 }
 
 double set_distance(const PathSet& a, const PathSet& b, PathDistance distance,

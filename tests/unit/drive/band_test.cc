@@ -37,9 +37,9 @@ TEST(PathBand, HoldsTheShareOfWholePathsThatItReports) {
   for (const double coverage : {0.5, 0.9}) {
     double inside = 0;
     for (std::uint64_t k = 0; k < 10; ++k) {
-      const PathBand band = PathBand::fit(drawn_runs(10000 * (k + 1), 200), coverage);
+      const auto band = path_band(drawn_runs(10000 * (k + 1), 200), coverage);
       for (const DrivenRun& run : drawn_runs(77 + 1000000 * (k + 1), 200)) {
-        inside += band.excursion(run) <= 1 ? 1 : 0;
+        inside += excursion(band, run) <= 1 ? 1 : 0;
       }
     }
     EXPECT_NEAR(inside / 2000, coverage, 0.03);
@@ -48,9 +48,9 @@ TEST(PathBand, HoldsTheShareOfWholePathsThatItReports) {
 
 TEST(PathBand, HeadingsMayLieAcrossTheWrap) {
   const auto runs = drawn_runs(1, 100, std::numbers::pi);
-  const PathBand band = PathBand::fit(runs, 0.9);
-  for (const BandPoint& point : band.points()) EXPECT_LT(point.above[2] + point.below[2], 3);
-  EXPECT_GT(std::abs(band.points().front().middle.theta), 3);
+  const auto band = path_band(runs, 0.9);
+  for (const BandPoint& point : band) EXPECT_LT(point.above[2] + point.below[2], 3);
+  EXPECT_GT(std::abs(band.front().middle.theta), 3);
 }
 
 TEST(Grid, FollowsEachLegsOwnTime) {

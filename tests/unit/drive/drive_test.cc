@@ -34,9 +34,9 @@ TEST_F(Drive, HeldOutPathsLieInsideTheBand) {
   ASSERT_TRUE(runs.ok()) << runs.error().message;
   const auto log = drive_commands(farm_, problem_, start, commands, 400, {.seed = 2});
   ASSERT_TRUE(log.ok()) << log.error().message;
-  const PathBand band = PathBand::fit(*runs, 0.9);
+  const auto band = path_band(*runs, 0.9);
   double inside = 0;
-  for (const DrivenRun& run : *log) inside += band.excursion(run) <= 1 ? 1 : 0;
+  for (const DrivenRun& run : *log) inside += excursion(band, run) <= 1 ? 1 : 0;
   std::cout << 100 * inside / 400 << " % of 400 held-out paths lie inside the 90 % band\n";
   EXPECT_GE(inside / 400, 0.85);
   EXPECT_LE(inside / 400, 0.95);
@@ -63,8 +63,8 @@ TEST_F(Drive, PlacesOfTheModelCountFromItsFrame) {
   };
   expect_moved(drive_commands(farm_, seamed, {}, commands, 8, {}),
                drive_commands(farm_, seamed, {100, -50, 0}, commands, 8, framed));
-  expect_moved(drive_commands(*simulated_mover(farm_, seamed, {}), {}, commands, 8),
-               drive_commands(*simulated_mover(farm_, seamed, framed), {100, -50, 0}, commands, 8));
+  expect_moved(drive_commands(simulated_mover(farm_, seamed, {}), {}, commands, 8),
+               drive_commands(simulated_mover(farm_, seamed, framed), {100, -50, 0}, commands, 8));
 }
 
 TEST_F(Drive, WaypointsAreReachedUnderACamera) {
@@ -77,7 +77,7 @@ TEST_F(Drive, WaypointsAreReachedUnderACamera) {
   EXPECT_EQ(pilot->right.command.name, "turn_cw");
   const std::vector<Eigen::Vector2d> targets = {{0.5, 0}, {0.5, 0.5}, {0, 0.5}};
   const auto mover = simulated_mover(farm_, problem_, {});
-  const auto runs = drive_waypoints(*mover, *pilot, {}, targets, 12);
+  const auto runs = drive_waypoints(mover, *pilot, {}, targets, 12);
   ASSERT_TRUE(runs.ok()) << runs.error().message;
   for (const DrivenRun& run : *runs) {
     ASSERT_EQ(run.size(), 6U);
@@ -88,7 +88,7 @@ TEST_F(Drive, WaypointsAreReachedUnderACamera) {
   }
   EXPECT_GT(end_ellipse(*runs, 0.9).major_m, 0.005) << "the drive is noisy";
   const auto steady = constant_velocity_mover(*nominal, {});
-  const auto exact = drive_waypoints(*steady, *pilot, {}, targets, 2);
+  const auto exact = drive_waypoints(steady, *pilot, {}, targets, 2);
   ASSERT_TRUE(exact.ok());
   const Pose& end = exact->front().back().path.back().pose;
   EXPECT_NEAR(end.x, 0, 0.02);
@@ -111,16 +111,16 @@ TEST_F(Drive, TheMinedModelSpreadsAsItsLogDoes) {
   const auto mined = MotionModel::mine(log, problem_.commands);
   ASSERT_TRUE(mined.ok());
   const auto mover = mined_mover(*mined, {.seed = 4});
-  const auto drawn = drive_commands(*mover, {}, forward, 400);
+  const auto drawn = drive_commands(mover, {}, forward, 400);
   ASSERT_TRUE(drawn.ok()) << drawn.error().message;
   const EndEllipse real = end_ellipse(runs, 0.9), model = end_ellipse(*drawn, 0.9);
   EXPECT_NEAR(model.mean.x, real.mean.x, 0.004);
   EXPECT_NEAR(model.major_m / real.major_m, 1, 0.25);
-  const auto other = drive_commands(*mover, {}, {problem_.command("turn_cw")}, 2);
+  const auto other = drive_commands(mover, {}, {problem_.command("turn_cw")}, 2);
   EXPECT_THAT(other.error().message, HasSubstr("turn_cw"));
 
   DriveReport report;
-  report.drivers.push_back({"simulation", runs, PathBand::fit(runs, 0.9), real, {}});
+  report.drivers.push_back({"simulation", runs, path_band(runs, 0.9), real, {}});
   EXPECT_THAT(drive_page(report, "Driven"), HasSubstr("Band that holds 90 %"));
   EXPECT_THAT(band_csv(report), HasSubstr("simulation,1,0.5,"));
 }

@@ -55,7 +55,7 @@ TEST_F(RacquetballInfluence, ReportsWhatMattersFromWhatDoesNot) {
   }
   EXPECT_FALSE(factor(*report, row_of(Racquetball::kSleepLinear)).alone.influential);
   EXPECT_FALSE(factor(*report, row_of(Racquetball::kSleepLinear)).morris.influential);
-  EXPECT_EQ(factor(*report, row_of(Racquetball::kSleepLinear)).morris.mean, 0);
+  EXPECT_EQ(factor(*report, row_of(Racquetball::kSleepLinear)).morris.distance, 0);
   EXPECT_FALSE(factor(*report, row_of(Racquetball::kSolverIterations)).alone.influential);
 
   const ParameterTable& table = config_.problem.table();
@@ -103,7 +103,7 @@ TEST(Influence, OfTheTrackedRobotKnowsWhatTreadsDoNotHave) {
   EXPECT_TRUE(factor(*report, row_of(Srv1::kFullSpeed)).alone.influential);
   EXPECT_FALSE(factor(*report, row_of(Srv1::kWheelShape)).alone.influential);
   EXPECT_FALSE(factor(*report, row_of(Srv1::kMotorTorque)).alone.influential);
-  EXPECT_EQ(factor(*report, row_of(Srv1::kMotorTorque)).morris.mean, 0);
+  EXPECT_EQ(factor(*report, row_of(Srv1::kMotorTorque)).morris.distance, 0);
 }
 
 TEST(EndSpread, IsTheScatterOfTheLastPoints) {
