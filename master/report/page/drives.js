@@ -94,12 +94,7 @@ function headingLayers(drive, lines) {
 
 function framed(layers, labels) {
   const points = layers.flatMap((l) => (l.points || l.arrows.flatMap(([a, b, c, d]) => [[a, b], [c, d]])));
-  const axis = (k) => {
-    const values = points.map((p) => p[k]).filter(isNumber);
-    const [min, max] = extent(values);
-    const room = 0.08 * (max - min) || 1;
-    return { min: min - room, max: max + room, label: labels[k] };
-  };
+  const axis = (k) => ({ ...roomy(...extent(points.map((p) => p[k]).filter(isNumber)), 0.08), label: labels[k] });
   return { x: axis(0), y: axis(1), layers, describe: () => "" };
 }
 
