@@ -105,11 +105,12 @@ void FleetChoice::declare(CLI::App& app, const std::string& with) {
 std::vector<std::string> FleetChoice::arguments(const std::string& with) const {
   std::vector<std::string> all = {with, system};
   for (const CLI::Option* option : options_) {
+    const std::string name = "--" + option->get_lnames().front();  // get_name() hides some
     const bool flag = option->get_items_expected_max() == 0;
-    if (flag && option->count() > 0) all.push_back(option->get_name());
+    if (flag && option->count() > 0) all.push_back(name);
     // The value may begin as an option does.
     for (const std::string& value : option->results()) {
-      if (!flag) all.push_back(option->get_name() + "=" + value);
+      if (!flag) all.push_back(name + "=" + value);
     }
   }
   return all;
