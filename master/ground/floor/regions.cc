@@ -167,7 +167,7 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
     const WindowFit climbed = fitter.fit(from_there, {}, start, kClimbingRounds);
     if (!parts<Region>(places, rows, climbed.values)) continue;
     // The robot's own values are those of the floor that most of the log was driven on, unless the
-    // log tells otherwise.
+    // log distinguishes.
     const double there = places_there(places, Region(rows, climbed.values));
     const bool own = 2 * there < static_cast<double>(places.size());
     const double likely = climbed.objective + (own ? kNotDistinguished : 0);

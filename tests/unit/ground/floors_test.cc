@@ -247,13 +247,14 @@ TEST(Floors, AnEdgesIntervalsHoldIt) {
   EXPECT_GE(held, std::floor(0.9 * asked - 2.33 * std::sqrt(0.09 * asked)));
 }
 
-// The runs of a floor that go every 60th degree.
-RunLog logged_on(const std::filesystem::path& data, const std::string& floor, int first) {
+// The runs of a floor that go every 60th degree, or `step` fives of degrees.
+RunLog logged_on(const std::filesystem::path& data, const std::string& floor, int first,
+                 int step = 12) {
   const auto map = parse_map(
       *read_text_file(GAPFARM_SOURCE_DIR "/configs/robots/robotino_map.toml"), "robotino_map.toml");
   EXPECT_TRUE(map.ok()) << map.error().message;
   std::vector<Recording> recordings;
-  for (int k = first; k < 72; k += 12) {
+  for (int k = first; k < 72; k += step) {
     const std::string name = (k < 10 ? "exp0" : "exp") + std::to_string(k) + ".csv";
     if (!std::filesystem::exists(data / floor / name)) continue;
     auto recording = read_recording((data / floor / name).string());
@@ -277,6 +278,21 @@ TEST(Floors, ARealRobotsFloorsAreReported) {
   EXPECT_LT(floor.effects[0].parameters[1].hi, -0.1);
   const Diagnosis same = diagnosed(logged_on(*data, "table", 2), &table);
   EXPECT_TRUE(same.effects.empty()) << same.headline;
+}
+
+// From the table over the edge of a mat, without a reference. By wheels and poses alone the robot
+// goes 0.85 of its wheels' way where it is wholly on the table, most of the log, and 0.7 on the
+// mat.
+TEST(Floors, ARealRobotsOwnFloorIsTheOneItDroveMost) {
+  const auto data = shared_data("ground/robotino");
+  if (!data) GTEST_SKIP() << "no shared data beside the sources";
+  const Diagnosis found = diagnosed(logged_on(*data, "table_gray", 0, 2));
+  const auto size_of = [&](const char* name) {
+    const auto at = std::ranges::find(found.effects, name, &NamedEffect::name);
+    return at == found.effects.end() ? NAN : at->parameters.at(0).value;
+  };
+  EXPECT_NEAR(size_of("wheel_slip"), -0.15, 0.02) << found.headline;
+  EXPECT_NEAR(size_of("floor_edge"), 0.7 / 0.85 - 1, 0.05) << found.headline;
 }
 
 }  // namespace
