@@ -55,7 +55,7 @@ void BM_Question(benchmark::State& state) {
   ExternalSimulator simulator(command, monotonic_seconds);
   const auto introduced = simulator.introduce();
   if (!introduced) return state.SkipWithError(introduced.error().message.c_str());
-  const auto program = make_external_program(command, *introduced);
+  const auto program = make_external_program(command, *introduced, /*objective=*/false);
   ExternalRequest request;
   request.declaration = &(*program)->table.declaration();
   request.values.assign(static_cast<std::size_t>(parameters), 0.123456789);
