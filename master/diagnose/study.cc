@@ -11,6 +11,7 @@
 #include "common/score/motion_model.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -37,9 +38,6 @@ Cell make_cell(const CommandSpec& driven, const CommandSpec& own) {
   cell.mirror = sense < 0 ? -1 : 1;
   return cell;
 }
-
-constexpr double kSearchedSd = 0.5, kOtherSd = 0.2;  // of a program's parameters, logarithmic
-constexpr double kShareOfRange = 1.0 / 6;            // where a logarithm has no meaning
 
 // Gauge and friction stay: turns depend on them as on length and ratio, and rest poses of another
 // robot's physics would drag them away from anything real.  So would they the ratio, which trades

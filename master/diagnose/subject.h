@@ -38,11 +38,8 @@ struct TrialView {
 struct DiagnosisSubject {
   const char* scenario = nullptr;
   const EffectDiagnoses* effects = nullptr;
-  // Net log-likelihood (nats over all trials) that an effect must gain to be named, and log10 of
-  // the p below which a leftover dependence is no chance: measured on logs without any effect
-  // (docs/diagnosis.md).
+  // Net log-likelihood (nats over all trials) that an effect must gain to be named.
   double least_gain;
-  double unknown_log10_p;
   // Standard deviations beyond which a trial that nothing smooth explains counts no more; 0: none.
   double farthest;
   double noise_tail;  // of refit_drive_noise()

@@ -15,6 +15,7 @@
 #include "master/diagnose/places/where.h"
 #include "master/diagnose/push/push_subject.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -60,10 +61,7 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
   DiagnosisSubject s;
   s.scenario = scenario;
   s.effects = &drive_effect_diagnoses();
-  // The best of the catalogue gained 4.4 at most in 90 of 100 null logs, 6.7 in 99, and the least
-  // p of twelve blocks was 10^-3.8 (400 logs; docs/diagnosis.md).
-  s.least_gain = 9;
-  s.unknown_log10_p = -4.2;
+  s.least_gain = kLeastGainOfDrives;
   s.farthest = 0;  // slips are looked for
   s.noise_tail = 1;
   s.base_moves = false;

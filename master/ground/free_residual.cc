@@ -11,13 +11,10 @@
 #include "common/base/text.h"
 #include "master/diagnose/correction/fit.h"
 #include "master/ground/fit/held_out.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
-
-// Windows of a length that a correction is learned from: of more, evenly spread ones.  40 bumps of
-// three values are as well known from these as from all.
-constexpr std::size_t kMostLessons = 600;
 
 // Of a robot whose file states none, m.
 constexpr double kUsualSeparation_m = 0.3;

@@ -17,6 +17,7 @@
 #include "master/ground/fit/kinematic_baseline.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -143,8 +144,8 @@ std::vector<std::vector<std::size_t>> groups_of(std::span<const std::size_t> run
   std::vector<std::vector<std::size_t>> groups;
   for (const auto& [name, windows] : runs) {
     std::size_t pieces = 1;
-    if (runs.size() < kRunsToDraw) {
-      pieces = (kRunsToDraw * windows.size() + run.size() - 1) / run.size();
+    if (runs.size() < kEnoughToScatter) {
+      pieces = (kEnoughToScatter * windows.size() + run.size() - 1) / run.size();
       pieces = std::min(pieces, windows.size());
     }
     const std::size_t first = groups.size();

@@ -15,6 +15,7 @@
 #include "master/ground/tolerances.h"
 #include "master/infer/fit.h"
 #include "master/infer/predictor.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -23,8 +24,7 @@ constexpr std::size_t kKept = 32;              // motions at values of commands
 constexpr double kFar_m = 1e6;                 // where a program that diverges is held to be
 constexpr double kReach_m = 0.3;               // of a robot whose size nobody knows
 constexpr double kChannelOffsetShare = 0.005;  // of a channel's root mean square
-constexpr double kUntuned = 0.05;     // m: a unit above it, a foot say, is what no tuning is
-constexpr double kTunedShare = 0.25;  // of a gene's range, as a standard deviation
+constexpr double kUntuned = 0.05;  // m: a unit above it, a foot say, is what no tuning is
 constexpr const char* kMarkers[] = {"marker_x", "marker_y", "marker_yaw"};
 constexpr const char* kMarkerRows[] = {"marker.x", "marker.y", "marker.yaw"};
 // Of the kinematics' rows, those that say how a program is asked and read.

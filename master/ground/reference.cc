@@ -16,34 +16,23 @@
 #include "master/ground/fit/scans.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 #include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {
 
-// How far off a file may be of which nothing is asked, in what a robot changes by by itself.
-constexpr double kFarOff = 20;
 // How little a value may be off that no log shows: of its tolerance.
 constexpr double kHeld = 1e-6;
-constexpr std::size_t kLeastWindows = 10;  // of one length, whose scatter is theirs to show
 // Headings of the tracked point that a fit begins at, how many of them are followed, for how many
 // rounds, and for how many more where faults are compared.
 constexpr int kTurns = 8;
-constexpr std::size_t kFollowed = 3;
 constexpr int kScanRounds = 3;
 constexpr int kRounds = 40, kFaultRounds = 8;
-// Of the median way and turn: rows may be nearly as unsure as they are long.
-constexpr double kExplained = 0.6;
-constexpr double kMostRatio = 2;                     // to the file's value, either way
 constexpr double kShift_s = 0.05, kMostShift_s = 1;  // between clocks that rows make one
 
-// A grip that was never reached has no upper end that shows, and none below that does not: half of
-// how far it may fall, in its logarithm, before the log would be two nats less likely.
-constexpr double kLeastGripGain = 2;  // nats
 constexpr double kMostUnsureGrip = 2, kGripStep = 0.1;
 constexpr double kSharpGrip = 1.8;  // of its shape
-
-constexpr int kMostTraits = 3;
 
 double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, Eigen::Index grip) {
   for (double fall = kGripStep; fall < kMostUnsureGrip; fall += kGripStep) {
@@ -54,7 +43,7 @@ double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, Eigen::Inde
       values[shape] = kSharpGrip;
     }
     best = std::max(best, fitter.hold(fit.rows, values).objective);
-    if (fit.objective - best > kLeastGripGain) return fall / 2;
+    if (fit.objective - best > kNotDistinguished) return fall / 2;
   }
   return kMostUnsureGrip / 2;
 }
@@ -79,7 +68,7 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
         rows[k].free = fresh ? h.propose != nullptr : fit.rows[k].free;  // may be anywhere
         if (fresh) rows[k].row.tolerance *= kFarOff;
       }
-      if (fitter.promise(fit, slopes, rows, values) < kLeastPromise) continue;
+      if (fitter.promise(fit, slopes, rows, values) < kLeastGroundPromise) continue;
       WindowFit with = fitter.fit(rows, {}, values);
       const double gain = gain_of(fitter, h, with, fit);
       if (gain < kLeastChangeGain) continue;
@@ -135,7 +124,7 @@ Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow
   }
   std::sort(turns.begin(), turns.end());
   std::optional<WindowFit> best;
-  for (std::size_t k = 0; k < kFollowed; ++k) {
+  for (std::size_t k = 0; k < kFinalists; ++k) {
     WindowFit fit = fitter.fit(turned_by(turns[k].second), {}, {}, kScanRounds);
     if (!best || fit.objective > best->objective) best = std::move(fit);
   }
@@ -279,10 +268,10 @@ Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
   WindowSettings kept = settings;
   std::erase_if(kept.horizons_s, [&](double horizon) {
     const auto set = window_set(robot, log, {{horizon}, settings.run_in_s});
-    return !set || set->trials.size() < kLeastWindows;
+    return !set || set->trials.size() < kEnoughToScatter;
   });
   if (kept.horizons_s.empty()) {
-    return Error{"it is too short: fewer than " + std::to_string(kLeastWindows) +
+    return Error{"it is too short: fewer than " + std::to_string(kEnoughToScatter) +
                  " windows of every length"};
   }
   ASSIGN_OR_RETURN(const auto windows, window_set(robot, log, kept));

@@ -10,6 +10,7 @@
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -24,7 +25,7 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
   if (hypothesis.propose) values = hypothesis.propose(fitter, search.fit, rows, here);
   if (values == here) {
     const double promised = fitter.promise(search.fit, slopes, rows, values);
-    if (promised < kLeastPromise) return {index, std::max(promised, 0.0), {}};
+    if (promised < kLeastGroundPromise) return {index, std::max(promised, 0.0), {}};
   }
   *fit = fitter.fit(rows, {}, values);
   Offer offer{index, gain_of(fitter, hypothesis, *fit, search.fit), {}};
@@ -198,7 +199,7 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   search->offers.push_back(offers);
   const double least = least_gain(*search);
   const double worth = std::min(least, kLeastGroundGain);
-  while (!tried.empty() && (tried.back().first.gain < worth || tried.size() > kMostCandidates)) {
+  while (!tried.empty() && (tried.back().first.gain < worth || tried.size() > kLeaders)) {
     tried.pop_back();
   }
   const auto shown = [&](const Candidate& c) {
@@ -326,7 +327,7 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   stage(kCatalogueStage);
   search.chain.push_back(fit_held_out(fitter, {}, {}));
   const GroundNames unnamed = search;
-  while (search.steps.size() < kMostSteps && take_step(fitter, work, &search)) {
+  while (search.steps.size() < kMostNames && take_step(fitter, work, &search)) {
   }
   if (!(work.stopped && work.stopped())) drop_again(fitter, work, unnamed, &search);
   if (!(work.stopped && work.stopped())) drop_stand_ins(fitter, work, unnamed, &search);

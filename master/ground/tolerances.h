@@ -1,5 +1,5 @@
-// The numbers that steer the diagnosis of a ground robot, each with its unit, what it means and
-// where it comes from.
+// What a ground robot's values are off by, each with its unit and where it comes from; what decides
+// on them is in master/infer/settings.h.
 //
 // "Cases" below are those of scripts/wrong_robots.py and the practice cases (docs/ground.md): real
 // logs of 17 sets with one error or none.  Where a number was chosen on them, other logs will do
@@ -8,6 +8,7 @@
 
 #include "common/base/constants.h"
 #include "common/robot/robot.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 
@@ -52,13 +53,6 @@ inline constexpr double kKeptFloorShare = 0.04;
 inline constexpr double kSlipAngle_rad = 0.17;      // rear tyres where they hold no more
 inline constexpr double kKeptSlipAngle_rad = 0.02;  // how well that is known
 inline constexpr double kKeptGripShape = 0.05;      // of a logarithm; the reference sets it
-
-// What lies within as many tolerances may be chance: 95 and 99 % of what is normal.
-inline constexpr double kMovedTolerances = 2, kFarTolerances = 2.58;
-
-// A robot of less than this share of its file's sizes and gains is another robot, and one of none
-// or of the opposite sign none at all.
-inline constexpr double kLeastRatio = 0.1;
 
 // -- Plausible errors: standard deviations of a value that is wrong.  What lies far outside has to
 // -- explain that many more nats: a scale of y by half is 133 of them.  Sizes: a wrong wheel or
@@ -108,65 +102,10 @@ inline constexpr PlausibleError kPlausibleErrors[] = {
     {"pose_scale", 0.05, "-"},
     {"aspect", 0.03, "-"},
 };
-// Of rows that are not listed, in tolerances: turns, and the 0.01 to 0.8 of slopes that MuJoCo's
-// robots come to on 0.02 to 0.1 rad (scripts/ground_floors.sh).
-inline constexpr double kPlausibleTolerances = 30;
 
-// -- Thresholds.
-// nats that a name must gain over what the tolerances allow, to be predicted held out at all.
-// Chosen: a separation 4.8 % off comes to 4.1 on runs of two poses; what is named is decided held
-// out.
-inline constexpr double kLeastGroundGain = 3;
-// The same of a change from one log to the next, of what a reference has beside the file, and, a
-// run, of clocks that are apart: these have no unchanged cases but the tables of docs/ground.md.
-inline constexpr double kLeastChangeGain = 6;
-// nats by second-order slopes below which nothing is fitted: a third of the above.
-inline constexpr double kLeastPromise = kLeastGroundGain / 3;
-inline constexpr double kPriceOfAValue = 2;  // nats that a second value of one name must gain
-// Beside that, of a border between floors: that the best of some tens of lines or circles that
-// differ was looked for (their logarithm).
-inline constexpr double kPriceOfLooking = 4;
-inline constexpr double kShareOfBest = 0.5;  // of the best gain, for an offer to compete held out
-// What a name leaves of itself to others, whose form is never quite right: windows that a further
-// name moves by less than this share of what the names before moved them by do not count for it,
-// and a simpler word may gain this much less.  Chosen: traces in the cases come to 0.2.
-inline constexpr double kTraceShare = 0.25;
-inline constexpr double kNotDistinguished = 2;  // nats: Bayes factors of 7 hardly show
-// nats a window that may be left unexplained for "none": residuals 10 % smaller, 3 ln 1.1.
-inline constexpr double kToleratedGap = 0.286;
-// Of a fault of the log: residuals shrink by this ratio, and nats.  Chosen on the practice cases.
-inline constexpr double kFaultShrinks = 1.4;
-inline constexpr double kFaultGain = 10;
-// A change of a robot: residuals shrink by this ratio, and each further name gains this share of
-// the first: what changed is modelled with a form that is wrong by some share.
-inline constexpr double kChangeShrinks = 1.01;
-inline constexpr double kShareOfFirst = 0.5;
-// A log that leaves more than this share of the deviation of a value's prior does not show it.
-inline constexpr double kUnshown = 0.7;
-// A run is off by itself where its windows miss by this many times what the other runs' do, in the
-// median: real runs of the cases reach 4.2, one that is mirrored alone 50 and more.
-inline constexpr double kFarRun = 10;
-// Commands do not explain motions of which the best fit leaves this share: real runs of the cases
-// come to 0.24 at most, with the commands of other runs to 0.69 and more.
-inline constexpr double kUnexplained = 0.5;
-// Motions are all alike where their mean deviation is less than this share of the way, and rad.
-inline constexpr double kEvenMotion = 0.1;
-// Of the frames on the way, for stale frames to be named: the Warthog's laser poses repeat 2 %.
-inline constexpr double kLeastStaleShare = 0.03;
-// Rounding is named where it is this share of the scatter of the shortest windows or more: a tenth
-// of its variance.
-inline constexpr double kLeastRounding = 0.3;
-
-// -- Budgets.
-inline constexpr int kMostFaults = 2;
-inline constexpr int kMostSteps = 4;         // names of values
-inline constexpr int kMostCandidates = 5;    // offers of a step that are predicted held out
-inline constexpr int kLeastRunsHeldOut = 4;  // whole runs are held out; of fewer, stretches
-inline constexpr int kFolds = 5;             // of the blocks
+// nats by second-order slopes below which nothing is fitted: a third of what a name must gain.
+inline constexpr double kLeastGroundPromise = kLeastGroundGain / 3;
 // Standard deviations of a 90 % interval by the folds' scatter: Student's of kFolds - 1 degrees.
 inline constexpr double kFoldTail = 2.13;
-inline constexpr int kGroundDraws = 400;  // of runs, with replacement
-// Fewer runs than this are cut into stretches, which are drawn again in their place.
-inline constexpr std::size_t kRunsToDraw = 10;
 
 }  // namespace gapfarm

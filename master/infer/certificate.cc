@@ -5,13 +5,14 @@
 
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::infer {
 namespace {
 
-// Of Student's log density (kTail) at its best scale, over Gaussian residuals of three dimensions:
-// mean curvature, and variance of a slope, in those of the Gaussian's own.  By simulation of
-// 200,000 of them.
+// Of Student's log density (kStudentTail) at its best scale, over Gaussian residuals of three
+// dimensions: mean curvature, and variance of a slope, in those of the Gaussian's own.  By
+// simulation of 200,000 of them.
 constexpr double kCurvature = 0.998, kSlopeVariance = 1.175;
 constexpr double kNothing = 1e-9;  // of the greatest information: none
 

@@ -23,16 +23,14 @@ Eigen::VectorXd least_deviations(const Eigen::MatrixXd& information);
 double chance_of_exceeding(double threshold, double freedom, double noncentrality);
 double noncentrality_for(double power, double threshold, double freedom);
 
-// Student's likeliest scale (kTail) on Gaussian noise of three dimensions, in standard deviations.
+// Student's likeliest scale (kStudentTail) on Gaussian noise of three dimensions, in standard
+// deviations.
 inline constexpr double kBestScaleOfGaussian = 0.848;
 
-// With which chance what is called detectable is named.
-inline constexpr double kDetectablePower = 0.95;
-
-// Squared size, in standard deviations, of parameters that a contest (compete()) names with that
-// chance where their gain is asked to be so many nats, held out: twice the gain in sample is a
-// chi-squared about it, of which Student's weights leave a known share on Gaussian noise, and each
-// parameter costs a nat when other observations are predicted (Stone 1977).
+// Squared size, in standard deviations, of parameters that a contest (compete()) names with the
+// chance kDetectablePower where their gain is asked to be so many nats, held out: twice the gain in
+// sample is a chi-squared about it, of which Student's weights leave a known share on Gaussian
+// noise, and each parameter costs a nat when other observations are predicted (Stone 1977).
 double detectable_squares(double least_gain, Eigen::Index parameters);
 
 }  // namespace gapfarm::infer

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "master/infer/climb.h"
@@ -58,7 +59,7 @@ class Search {
 
  private:
   Fitter fitter(const Space& space) const { return Fitter(forward_, observations_, space); }
-  Result<std::vector<Runner>> at_starts(std::size_t hypothesis, const Anchor& anchor) const;
+  Result<std::optional<Runner>> best_start(std::size_t hypothesis, const Anchor& anchor) const;
   Result<Fit> from_neutral(const Hypothesis& h, const Fitter& fitter, const Anchor& anchor) const;
   Status search_blindly(Runner* runner) const;
 
@@ -83,8 +84,9 @@ Result<std::vector<Anchor>> Search::anchors(const Eigen::VectorXd& base,
   return anchors;
 }
 
-// The best few; where a start reaches a part of the observations, the others are the anchor's.
-Result<std::vector<Runner>> Search::at_starts(std::size_t hypothesis, const Anchor& anchor) const {
+// Where a start reaches a part of the observations, the others are the anchor's.
+Result<std::optional<Runner>> Search::best_start(std::size_t hypothesis,
+                                                 const Anchor& anchor) const {
   const Hypothesis& h = hypotheses_[hypothesis];
   const Space own = base_.only(h.coordinates), space = base_.with(h.coordinates);
   std::vector<std::vector<std::uint32_t>> reach;
@@ -98,22 +100,17 @@ Result<std::vector<Runner>> Search::at_starts(std::size_t hypothesis, const Anch
     reach.push_back(std::move(some));
   }
   ASSIGN_OR_RETURN(auto fits, fitter(space).starts(points, spaces, reach, anchor.z));
-  std::vector<Runner> runners;
-  for (std::size_t k = 0; k < fits.size(); ++k) {
-    if (std::isfinite(fits[k].score))
-      runners.push_back({hypothesis, spaces[k], std::move(fits[k])});
-  }
-  std::stable_sort(runners.begin(), runners.end(),
-                   [](const Runner& a, const Runner& b) { return a.fit.score > b.fit.score; });
-  if (runners.size() > kStartsKept) runners.erase(runners.begin() + kStartsKept, runners.end());
-  for (Runner& runner : runners) {
-    // Of the base's parameters the anchor's slopes will do until a step shows that they do not.
-    runner.fit.slopes = anchor.slopes;
-    runner.fit.differences = anchor.differences;
-    RETURN_IF_ERROR(fitter(runner.space).differentiate(&runner.fit, anchor.u.size()));
-    runner.fit.fresh = false;
-  }
-  return runners;
+  const auto best = std::ranges::max_element(
+      fits, {}, [](const Fit& fit) { return std::isfinite(fit.score) ? fit.score : -INFINITY; });
+  if (best == fits.end() || !std::isfinite(best->score)) return std::optional<Runner>();
+  Runner runner{hypothesis, spaces[static_cast<std::size_t>(best - fits.begin())],
+                std::move(*best)};
+  // Of the base's parameters the anchor's slopes will do until a step shows that they do not.
+  runner.fit.slopes = anchor.slopes;
+  runner.fit.differences = anchor.differences;
+  RETURN_IF_ERROR(fitter(runner.space).differentiate(&runner.fit, anchor.u.size()));
+  runner.fit.fresh = false;
+  return std::optional<Runner>(std::move(runner));
 }
 
 Result<Fit> Search::from_neutral(const Hypothesis& h, const Fitter& fitter,
@@ -143,8 +140,8 @@ Result<std::vector<Runner>> Search::line_up(const std::vector<Anchor>& anchors,
       const bool best = &anchor == &best_of(anchors);
       if (!h.starts.empty() && (best || h.starts.size() <= kFewStarts) &&
           (everywhere || !h.from_neutral)) {
-        ASSIGN_OR_RETURN(auto at, at_starts(k, anchor));
-        for (Runner& runner : at) runners.push_back(std::move(runner));
+        ASSIGN_OR_RETURN(auto at, best_start(k, anchor));
+        if (at) runners.push_back(std::move(*at));
       }
       if (!h.from_neutral) continue;
       ASSIGN_OR_RETURN(auto neutral, from_neutral(h, fits, anchor));

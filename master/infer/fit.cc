@@ -9,6 +9,7 @@
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::infer {
 namespace {
@@ -17,20 +18,20 @@ constexpr int kMostHalvings = 3;
 constexpr double kFirstDifference = 0.2;  // of a coordinate
 constexpr double kLeastDifference = 0.01, kMostDifference = 1.5;
 constexpr double kLeastDamping = 1e-3;
-constexpr double kFar = 4;  // standard deviations
 // Shares of a difference, in the order in which they are tried.
 constexpr double kTries[] = {1, -1, 0.1, -0.1};
 
 double weight(Loss loss, double squares, double scale) {
-  if (loss == Loss::kStudent) return (kTail + 3) / (kTail * scale * scale + squares);
-  const double far = std::min(1.0, kFar * kFar * scale * scale / squares);
+  if (loss == Loss::kStudent) return (kStudentTail + 3) / (kStudentTail * scale * scale + squares);
+  const double far = std::min(1.0, kFarDeviations * kFarDeviations * scale * scale / squares);
   return (loss == Loss::kHuber ? std::sqrt(far) : far) / (scale * scale);
 }
 
 double score_of(Loss loss, double squares, double scale) {
-  const double relative = squares / (scale * scale), far = kFar * kFar;
+  const double relative = squares / (scale * scale), far = kFarDeviations * kFarDeviations;
   const double constant = -3 * std::log(scale);
-  if (loss == Loss::kStudent) return constant - (kTail + 3) / 2 * std::log1p(relative / kTail);
+  if (loss == Loss::kStudent)
+    return constant - (kStudentTail + 3) / 2 * std::log1p(relative / kStudentTail);
   const double beyond = std::max(1.0, relative / far);
   const double grown = loss == Loss::kHuber ? 2 * (std::sqrt(beyond) - 1) : std::log(beyond);
   return constant - 0.5 * (std::min(relative, far) + far * grown);
@@ -193,7 +194,7 @@ Status Fitter::move_each(const Forward& forward, const Eigen::VectorXd& from, do
     Eigen::VectorXd change = whitened(*ends[j]) - from;
     const double moved =
         std::sqrt(change.squaredNorm() / (3 * static_cast<double>(ends[j]->size())));
-    bound_jumps(kFar * std::max(moved, fit->scale), &change);
+    bound_jumps(kFarDeviations * std::max(moved, fit->scale), &change);
     fit->slopes.col(k) = change / step;
     const double good = kGoodMove * fit->scale / std::max(moved / std::abs(step), 1e-9);
     fit->differences[k] = std::clamp(good, kLeastDifference, kMostDifference);
@@ -283,13 +284,13 @@ Status Fitter::step(Fit* fit) const {
     const double gained = next.score - fit->score;
     if (gained > 0) {
       const double trust = gained / promised;
-      next.damping = trust > kLeastTrust ? fit->damping / 10 : fit->damping;
+      next.damping = trust > 1 / kMostTrust ? fit->damping / 10 : fit->damping;
       next.differences = fit->differences;
       // Broyden's correction: slopes of before that give what this step did.
       next.slopes = fit->slopes + (next.z - fit->z - fit->slopes * delta) * delta.transpose() /
                                       delta.squaredNorm();
       next.settled = gained < kSettledGain && fit->fresh;
-      const bool lied = trust < kLeastTrust || trust > kMostTrust;
+      const bool lied = trust < 1 / kMostTrust || trust > kMostTrust;
       if (!next.settled && (lied || gained < kSettledGain)) next.slopes.resize(0, 0);
       *fit = std::move(next);
       return {};

@@ -15,11 +15,11 @@
 
 namespace gapfarm::infer {
 
-// How observations pull that are far out.  kStudent: the less the farther, by Student's t of kTail.
-// Where the noise is known, those within kFar of it pull in full, and others all alike, which leads
-// from afar (kHuber), or the less the farther, since near the end they are something else, which
-// must not lead away (kRedescending; MM-estimates begin with the one and end with the other, Yohai
-// 1987).
+// How observations pull that are far out.  kStudent: the less the farther, by Student's t of
+// kStudentTail. Where the noise is known, those within kFar of it pull in full, and others all
+// alike, which leads from afar (kHuber), or the less the farther, since near the end they are
+// something else, which must not lead away (kRedescending; MM-estimates begin with the one and end
+// with the other, Yohai 1987).
 enum class Loss { kStudent, kHuber, kRedescending };
 
 // What was measured: a pose an observation, what it varies by, and the part of the data that it is
@@ -33,7 +33,7 @@ struct Observations {
   // observation.
   Eigen::MatrixXd columns = {};
   // Between which the scale of the noise lies, over what the whitener says.
-  double least_scale = kLeastScale, most_scale = INFINITY;
+  double least_scale = kLeastNoiseScale, most_scale = INFINITY;
   Loss loss = Loss::kStudent;
   // How often each counts; 0: nothing is learnt from it.  Empty: once.
   std::vector<double> weight = {};

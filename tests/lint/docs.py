@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Docs that hold: links and anchors exist, paths of the architecture exist, commands are commands, each page begins
-with its purpose and a command, README is short.  Usage: docs.py ROOT"""
+with its purpose and a command, README is short, the table of
+settings is what its script prints.  Usage: docs.py ROOT"""
 import os
 import re
+import subprocess
 import sys
 
 README_LINES = 80    # one screen and a half
@@ -79,6 +81,10 @@ def main():
         lines = len(f.read().split('\n'))
     if lines > README_LINES:
         wrong.append(f'README.md: {lines} lines, at most {README_LINES}; what is more goes to docs/')
+    settings = subprocess.run([os.path.join(root, 'scripts/settings.py')], capture_output=True, text=True, check=False)
+    with open(os.path.join(root, 'docs/evidence/settings.md'), encoding='utf-8') as f:
+        if settings.returncode != 0 or settings.stdout != f.read():
+            wrong.append(settings.stderr + 'docs/evidence/settings.md: make it anew: scripts/settings.py > docs/evidence/settings.md')
     if wrong:
         print('\n'.join(wrong))
         return 1

@@ -14,11 +14,10 @@
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/proposals.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr double kFewInCell = 4;
 
 std::string estimate_text(const Estimate& e, double factor, const std::string& unit,
                           bool intervals) {
@@ -345,8 +344,8 @@ std::vector<Leftover> leftovers(const Regression& explained,
 }
 
 Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left,
-                      double unknown_log10_p, double wrong_share) {
-  const bool unknown = !left.empty() && left.front().log10_p < unknown_log10_p;
+                      double wrong_share) {
+  const bool unknown = !left.empty() && left.front().log10_p < kUnknownLog10P;
   if (!unknown) return named ? Verdict::kEffect : Verdict::kNone;
   if (!named || left.front().excess > wrong_share * std::max(explained_nats, 1.0)) {
     return Verdict::kUnknown;

@@ -9,11 +9,11 @@
 #include "common/base/ranges.h"
 #include "common/score/fitness.h"
 #include "master/diagnose/conclusions/findings.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr std::uint64_t kFewestRepeats = 3;
 constexpr std::uint64_t kMostTrials = 500;  // a design that needs more separates nothing
 constexpr std::size_t kMostSentences = 2;
 constexpr double kAlikeFromAnywhere = 0.7;  // least over mean divergence of the starts
@@ -206,7 +206,7 @@ std::uint64_t trials_needed(double divergence) {
   constexpr double kMost = 1e15;
   if (!(divergence > 0)) return static_cast<std::uint64_t>(kMost);
   const double needed = std::ceil(std::min(kMost, 2 * kQuantile * kQuantile / divergence));
-  return std::max(kFewestRepeats, static_cast<std::uint64_t>(needed));
+  return std::max(kFewestAlike, static_cast<std::uint64_t>(needed));
 }
 
 Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,

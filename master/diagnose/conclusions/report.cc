@@ -14,6 +14,7 @@
 #include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/steps/step_parts.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -106,8 +107,8 @@ std::string place_text(const DiagnosisRequest& of, const Signature& second,
 
 }  // namespace
 
-std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p) {
-  std::erase_if(left, [&](const Leftover& l) { return !(l.log10_p < unknown_log10_p); });
+std::vector<std::string> leftover_caution(std::vector<Leftover> left) {
+  std::erase_if(left, [](const Leftover& l) { return !(l.log10_p < kUnknownLog10P); });
   std::ranges::stable_sort(left, {}, &Leftover::log10_p);
   std::vector<std::string> covariates = mapped(left, [](const Leftover& l) { return l.covariate; });
   if (covariates.empty()) return {};
@@ -169,7 +170,7 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
   // Cautions, the gravest first: what the simulation does not explain or model, then what the log
   // does not show, then what is only to be known.
   if (Status s = compare_with_baselines(of, refit, &d); !s) return s.error();
-  append(leftover_caution(refit.judged.left, of.subject.unknown_log10_p), &d);
+  append(leftover_caution(refit.judged.left), &d);
   fill_values(of, refit, &result);
   fill_where(of, refit, &d);
   if (d.verdict == Verdict::kEffectAndUnknown && !named.chosen.empty()) {
@@ -251,7 +252,7 @@ Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const
     Regression with_it = explained;
     with_it.add(second.signature.columns);
     const std::vector<Leftover> left = leftovers(with_it, named.evidence->blocks);
-    const bool all = left.empty() || left.front().log10_p >= of.subject.unknown_log10_p;
+    const bool all = left.empty() || left.front().log10_p >= kUnknownLog10P;
     const bool two = named.chose(second_of(name)), room = !two && !second_of(name).empty();
     sentences.push_back(std::string(two ? "A third " : "A second ") + name + " (" +
                         place_text(of, second.signature, keys) + ") would explain " +

@@ -13,11 +13,10 @@
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/infer/certificate.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
-
-constexpr int kBootstraps = 400;
 
 // Of every trial, by a nested fit over the one before.
 std::vector<double> gained_by(const Refit& refit, std::size_t nested) {
@@ -187,13 +186,10 @@ RootMeanSquare error_of_noise(const Study& study) {
 }
 
 RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::size_t>& folds) {
-  // Standard deviations of the noise.  Beside a seam, say, a slope is that of a jump, and a step
-  // along it leads metres away; scores hardly feel such a trial, squares nothing else.
-  constexpr double kFarthestStep = 5;
   std::vector<Eigen::Vector3d> residuals = held_out_residuals(nested.study, nested.fit, folds);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const Eigen::Vector3d& own = nested.fit.residuals[i];
-    if ((nested.study.whitener[i] * (residuals[i] - own)).norm() > kFarthestStep)
+    if ((nested.study.whitener[i] * (residuals[i] - own)).norm() > kOutlierDeviations)
       residuals[i] = own;
   }
   return root_mean_square(residuals);
@@ -223,7 +219,7 @@ ClosedShare closed_share(const DiagnosisRequest& of, const Refit& refit,
   const double whole = share(all);
   Stream stream({of.options.seed, Purpose::kStatistics, 3, 0, 0});
   std::vector<double> shares;
-  for (int b = 0; b < kBootstraps; ++b) {
+  for (int b = 0; b < kDraws; ++b) {
     for (std::size_t& c : all) c = stream.below(chains.size());
     shares.push_back(share(all));
   }

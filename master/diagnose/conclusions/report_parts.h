@@ -59,7 +59,7 @@ Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Pro
                  Diagnosis* diagnosis);
 
 // One sentence of all that what is left depends on, the clearest first; none where there is none.
-std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p);
+std::vector<std::string> leftover_caution(std::vector<Leftover> left);
 // What could not be looked for, a sentence each.
 std::vector<std::string> not_looked_for(const DiagnosisRequest& of);
 // What was held out of the simulation, a sentence a reason.

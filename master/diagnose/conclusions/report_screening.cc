@@ -11,6 +11,7 @@
 #include "master/diagnose/evidence/residuals.h"
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/steps/step_parts.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -30,7 +31,7 @@ ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
   if (kind_of(name) != name) return note("a second one, looked for beside the first");
   if (name == kPatchEffect) return note("no disc of floor promises enough to be simulated");
   if (name == "pose_latency") {
-    if (named.study().gaps.size() < kFewestGaps)
+    if (named.study().gaps.size() < kFewestReadings)
       return note("too few resting poses were read twice");
     return {named.latency.gain, "latency",
             named.latency_from_rest_s > 0 ? named.latency_from_rest_s : named.latency.latency_s,

@@ -10,16 +10,13 @@
 #include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kSpacing = 0.7;  // of centres, in lengths
-constexpr std::size_t kMostOfCommand = 24;
-constexpr std::size_t kMostOfAll = 40;
 constexpr double kJitter = 1e-6;
-// Standard deviations beyond which a trial pulls no harder.
-constexpr double kFarthestPull = 10;
 constexpr int kRounds = 4;       // that these are found in
 constexpr double kApart = 2;     // bumps in a row, in lengths: their sum is even to 1.5 %
 constexpr double kBeyond = 0.1;  // that a row goes on past the last reading, of all readings' range

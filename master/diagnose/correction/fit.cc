@@ -8,11 +8,11 @@
 #include "common/math/statistics.h"
 #include "master/diagnose/correction/basis.h"
 #include "master/infer/compete.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kMostFittedTerms = 3;
 // Prior standard deviations of shifts, in units of the noise's.
 const std::vector<double> kAmplitudes = {0.5, 2, 8, 32};
 
@@ -110,8 +110,6 @@ constexpr double kOutlierShare = 0.02, kOutlierScale = 5;
 constexpr double kFarthestMiss = 3;  // standard deviations beyond which a trial pulls no harder
 constexpr int kMissRounds = 12;
 constexpr std::size_t kLeastCrossings = 4;
-// Nats, of the best of a thousand places: noise alone reaches half of that.
-constexpr double kLeastGain = 20;
 
 // A drive's readings along the covariate, and what a shift of what lies beyond does to its end.
 struct Crossing {
@@ -209,7 +207,7 @@ std::optional<double> best_edge(const ResidualData& data, const Residuals& resid
   }
   std::sort(readings.begin(), readings.end());
   std::optional<double> best;
-  double most = kLeastGain;
+  double most = kLeastSecondOfAKind;
   for (std::size_t r = 0; r + 1 < readings.size(); ++r) {
     const double edge = (readings[r] + readings[r + 1]) / 2;
     const double gain = gain_at(drives, edge);

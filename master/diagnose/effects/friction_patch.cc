@@ -4,14 +4,10 @@
 #include "common/pose/pose.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/fit/signatures.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
-
-// A patch's mark changes within a few cm and has several hills when it is weak: standard deviation
-// of its place and radius, and of its ratio's distance from 1 as a share, for a gain of half a nat.
-constexpr double kPatchPlace_m = 0.25;
-constexpr double kPatchRatio = 1;
 
 // At its edge a small error of the place is a large one of the motion.
 bool contaminated_at_edge(const Signature& chosen, const ResidualTrial& trial) {

@@ -6,11 +6,10 @@
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/evidence/slip.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr double kLeastSlipGain = 11;  // nats; null logs stay below 8
 
 SlipFit slip_of(const SpreadFit& fit) {
   return {fit.gain, fit.estimates[0].value, fit.estimates[1].value, *fit.noise};

@@ -7,13 +7,11 @@
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/fit/estimate.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kFewestStarts = 20;
-// What does as well within so many nats is not distinguished.
-constexpr double kClearer_nats = 2;
 constexpr double kTriedShares[] = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7};
 
 std::vector<double> tried_angles() {
@@ -66,7 +64,7 @@ SpreadFit start_fit(double gain, double share, double angle, double starts) {
 SpreadFit fit_unsettled(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                         double outlier_share) {
   const auto starts = static_cast<std::size_t>(std::ranges::count_if(study.trials, follows_move));
-  if (starts < kFewestStarts || study.size() - starts < kFewestStarts) return {};
+  if (starts < kFewestReadings || study.size() - starts < kFewestReadings) return {};
   const std::vector<double> straight = scores_of(study, residuals, outlier_share);
   SpreadFit best;
   double anywhere = 0;
@@ -82,7 +80,7 @@ SpreadFit fit_unsettled(const Study& study, const std::vector<Eigen::Vector3d>& 
       if (after_moves > best.gain) best = start_fit(after_moves, share, angle, double(starts));
     }
   }
-  return best.gain < anywhere + kClearer_nats ? SpreadFit{} : best;
+  return best.gain < anywhere + kNotDistinguished ? SpreadFit{} : best;
 }
 
 std::vector<double> scores_with_unsettled(const Study& study,

@@ -10,11 +10,11 @@
 #include "common/score/scale_mixture.h"
 #include "master/diagnose/subject.h"
 #include "master/infer/climb.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kClearlyThere = 4.5;  // standard deviations of a chi-square
 constexpr double kLeastDriveNoise = 2e-3;
 constexpr double kMedianChiSquare1 = 0.455;
 
@@ -62,7 +62,6 @@ NoiseEstimate climb(const std::function<double(const NoiseEstimate&)>& nats,
 }
 
 constexpr double kMost = 0.5;
-constexpr double kTailFromSquared = 14;  // chi-square with 3 degrees of freedom: one in 340
 
 }  // namespace
 

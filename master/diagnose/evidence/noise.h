@@ -54,8 +54,6 @@ double perfect_score(std::span<const ResidualTrial> trials, const NoiseEstimate&
 
 // Of any noise that is fitted: keeps logarithms and covariances finite.
 inline constexpr double kLeastDeviation = 1e-4;
-// The tail among free commands: no cell's spread holds the noise there.
-inline constexpr double kFreeNoiseTail = 7;
 
 // Robust maximum likelihood over the drive's two standard deviations (and the readings' two, with
 // `fit_pose`): squared distances beyond 14 count by their logarithm, so that rare events do not

@@ -5,15 +5,12 @@
 #include <numbers>
 
 #include "common/math/statistics.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kFarGap_m = 0.05, kFarGap_rad = 0.35;  // farther is no rounding
-// A Gaussian has 3; the sampling error with 450 gaps is 0.16 for the positions (two a gap) and 0.23
-// for the headings, and these are four of them.
-constexpr double kHeavyPosition = 3.6;
-constexpr double kHeavyHeading = 3.9;
 
 double squared(double v) { return v * v; }
 
@@ -69,7 +66,6 @@ std::vector<ReadingGap> reading_gaps(const TrialLog& log,
 std::vector<ReadingGap> late_reading_gaps(const std::vector<ResidualTrial>& trials,
                                           const std::vector<Eigen::Vector3d>& end_velocity,
                                           const PoseNoise& noise) {
-  constexpr double kWithin = 5;  // standard deviations
   const Eigen::Vector3d sd =
       std::sqrt(2.0) * Eigen::Vector3d(noise.position_m, noise.position_m, noise.heading_rad);
   std::vector<ReadingGap> gaps;
@@ -82,14 +78,14 @@ std::vector<ReadingGap> late_reading_gaps(const std::vector<ResidualTrial>& tria
     const Eigen::Vector3d z = gap.gap.cwiseQuotient(sd);
     const double age = std::clamp(z.dot(per_second) / std::max(per_second.squaredNorm(), 1e-12),
                                   0.0, kOldestReading_s);
-    const bool late = (z - age * per_second).cwiseAbs().maxCoeff() < kWithin;
+    const bool late = (z - age * per_second).cwiseAbs().maxCoeff() < kOutlierDeviations;
     if (!context.moved || late) gaps.push_back(gap);
   }
   return gaps;
 }
 
 PoseNoise reading_noise(std::span<const ReadingGap> gaps, const PoseGrid& grid) {
-  if (gaps.size() < kFewestGaps) return {0, 0};
+  if (gaps.size() < kFewestReadings) return {0, 0};
   std::vector<double> position, heading;
   std::size_t shared = 0;
   for (const ReadingGap& g : gaps) {
@@ -99,7 +95,7 @@ PoseNoise reading_noise(std::span<const ReadingGap> gaps, const PoseGrid& grid) 
   }
   // On a coarse grid positions repeat, or headings do, but not both.
   if (2 * shared > gaps.size()) return {0, 0};
-  return {std::max(1e-4, one_of_two(std::move(position), grid.step_m, kFarGap_m, kHeavyPosition)),
+  return {std::max(1e-4, one_of_two(std::move(position), grid.step_m, kFarGap_m, kHeavyTails)),
           std::max(1e-3, one_of_two(std::move(heading), grid.heading_step_rad, kFarGap_rad,
                                     kHeavyHeading))};
 }

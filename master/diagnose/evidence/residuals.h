@@ -14,6 +14,7 @@
 #include "common/trials/pose_readings.h"
 #include "common/trials/trial.h"
 #include "master/diagnose/push/push_geometry.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 
@@ -79,21 +80,15 @@ struct ReadingGap {
 };
 std::vector<ReadingGap> reading_gaps(const TrialLog& log,
                                      const std::vector<TrialContext>& contexts);
-// Those, and what was taken for a move of the robot but lies where an end reading up to
-// kOldestReading_s too old would leave it; `end_velocity` is in the axes of each trial's end.
-inline constexpr double kOldestReading_s = 0.5;
 std::vector<ReadingGap> late_reading_gaps(const std::vector<ResidualTrial>& trials,
                                           const std::vector<Eigen::Vector3d>& end_velocity,
                                           const PoseNoise& noise);
 
-// Fewer readings of resting poses show nothing of the readings.
-inline constexpr std::size_t kFewestGaps = 20;
-
 // Noise of one reading, from two readings of one pose: the gaps' standard deviation over sqrt(2),
 // or its estimate from the median where their tails are heavy, as late readings make them.  Kept
 // above 0.1 mm and 1 mrad, and on a grid above its step / sqrt(12).  {0, 0} says that the gaps
-// do not show: fewer than kFewestGaps, or most exactly zero because the log shares readings between
-// trials. The noise then comes from residuals (refit_drive_noise() with fit_pose).
+// do not show: fewer than kFewestReadings, or most exactly zero because the log shares readings
+// between trials. The noise then comes from residuals (refit_drive_noise() with fit_pose).
 PoseNoise reading_noise(std::span<const ReadingGap> gaps, const PoseGrid& grid);
 
 }  // namespace gapfarm

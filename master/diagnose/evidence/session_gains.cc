@@ -10,11 +10,11 @@
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kFewestTrials = 10;  // of a session that shows anything
 constexpr double kLeastSpread = 0.004, kMostSpread = 0.3, kSpreadStep = 1.08;
 constexpr int kReweightings = 3;
 
@@ -170,7 +170,7 @@ SpreadFit fit_session_gains(const Study& study, const std::vector<Eigen::Vector3
                             double) {
   if (study.sessions < 2) return {};
   const std::vector<std::size_t> trials = trials_of_sessions(study);
-  const auto is_informative = [](std::size_t count) { return count >= kFewestTrials; };
+  const auto is_informative = [](std::size_t count) { return count >= kEnoughToScatter; };
   if (std::count_if(trials.begin(), trials.end(), is_informative) < 2) return {};
   const Eigen::MatrixXd common = common_gains(study);
   const Eigen::VectorXd gains = whitened_gains(study), data = study.whiten(residuals);

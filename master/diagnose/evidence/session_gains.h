@@ -15,9 +15,6 @@ namespace gapfarm {
 // looked for.  Effects on the mean do without what it does to trials, and it is named when trials
 // that no fit saw are clearly predicted better with it.
 
-// Squared distance with 3 degrees of freedom beyond which a trial is an outlier: one in 110.
-inline constexpr double kFarSquared = 11.5;
-
 struct SpreadFit {
   double gain = 0;  // nats over all trials
   std::vector<Estimate>

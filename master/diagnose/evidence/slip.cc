@@ -12,12 +12,12 @@
 #include "common/pose/pose.h"
 #include "common/score/density.h"
 #include "master/infer/climb.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr int kNodes = 6;             // midpoints of equal shares of (0, loss)
-constexpr double kWorthFitting = 4;   // nats; noise alone gains about one a parameter
 constexpr double kLeastDrive = 1e-4;  // its logarithm is searched
 
 struct Event {
@@ -47,8 +47,6 @@ constexpr std::array<double, 6> kPlaceRadii_m = {0.1, 0.15, 0.2, 0.3, 0.4, 0.55}
 constexpr double kLineStep_m = 0.05;
 constexpr double kAbout_m = 0.03;   // of a line: readings near it count as across
 constexpr double kMostPlaces = 40;  // along an axis
-constexpr double kPriorTrials = 5;  // with the log's own rate, in every group of drives
-constexpr double kFewestSlips = 3;  // in a place
 
 struct DrivenLine {
   Eigen::Vector2d from, to;
@@ -184,7 +182,7 @@ SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::V
       }
     }
   }
-  if (fit.gain < kWorthFitting) return fit;
+  if (fit.gain < kLeastPromise) return fit;
   std::vector<double> x = {plain[0], plain[1], std::log(fit.probability / (1 - fit.probability)),
                            std::log(fit.loss)};
   const double gain = std::max(fit.gain, maximise(120, &x) - base);
@@ -248,7 +246,7 @@ Gathering gathering_of_slips(const Study& study, std::span<const double> slipped
       expected_here += chance[i];
     }
     const double rest = slips - here, expected_rest = slips - expected_here;
-    if (here < kFewestSlips || here <= expected_here || expected_here <= 0) continue;
+    if (here < kFewestAlike || here <= expected_here || expected_here <= 0) continue;
     const double gain = here * std::log(here / expected_here) +
                         (rest > 0 ? rest * std::log(rest / expected_rest) : 0);
     if (gain > best.gain) best = {gain, place.description, std::move(passed)};

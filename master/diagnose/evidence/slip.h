@@ -46,10 +46,6 @@ struct Gathering {
   std::vector<bool> passed;  // whether each trial's drive went there
 };
 
-// A gain that slips which fall anywhere reach in less than one of 500 logs: the best of about 500
-// places that differ, twice a gain being a chi-square with one degree of freedom.
-inline constexpr double kLeastGathering = 10;
-
 // Scan for a place that drives pass through in which they slip more often than elsewhere: Kulldorff
 // (1997), Poisson.  `slipped`: probability that each trial did; trials of false `informative` do
 // not count.  Longer drives show slips better, so what is expected goes by kind and length of a

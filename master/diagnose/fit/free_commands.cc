@@ -10,13 +10,12 @@
 
 #include "common/base/ranges.h"
 #include "master/diagnose/fit/slopes.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kFreedRepeats = 4;  // trials of a cell that make its mean worth something
-constexpr double kFreeShare = 1.0 / 3.0;  // of the trials
-constexpr double kPathTrust = 1e-3;       // of the duties' word on the way, beside the ends'
+constexpr double kPathTrust = 1e-3;  // of the duties' word on the way, beside the ends'
 
 // A command seen along and across: both sides together, and against each other.
 struct Duties {
@@ -147,7 +146,7 @@ bool commands_are_free(std::span<const Cell> cells) {
   std::size_t trials = 0, few = 0;
   for (const Cell& cell : cells) {
     trials += cell.trials;
-    if (cell.trials < kFreedRepeats) few += cell.trials;
+    if (cell.trials < kFewInCell) few += cell.trials;
   }
   return static_cast<double>(few) > kFreeShare * static_cast<double>(trials);
 }

@@ -17,9 +17,7 @@ constexpr double kAside = 2, kLeastAside = 0.5;
 // Steps in which the others follow (straight valleys need none), moves to somewhere better, and
 // rounds of the fit that goes on from there: chosen for the CPU seconds that they cost, on blind
 // checks of seeds 41, 43 and 47.
-constexpr int kFollowing = 2, kMostMoves = 4;
-// Times the standard error of the slopes; chosen, for a rise of nothing would make it infinite.
-constexpr double kWidest = 3;
+constexpr int kFollowing = 2;
 
 struct Aside {
   Eigen::Index parameter = 0;
@@ -68,7 +66,7 @@ class Profile {
     for (const Aside& aside : asides_) {
       if (aside.there.score > best->score) best = &aside.there;
     }
-    return best->score > middle_.score + infer::kSettledGain ? best : nullptr;
+    return best->score > middle_.score + kSettledGain ? best : nullptr;
   }
 
   // By how much each effect's parameter is known less well than slopes say.
@@ -117,7 +115,7 @@ class Profile {
     held.matrix(k, k) = 1;
     held.right[k] = 0;
     const Eigen::VectorXd move = solve_symmetric(held.matrix, held.right);
-    if (held.gain(move) > infer::kSettledGain) aside->move = move;
+    if (held.gain(move) > kSettledGain) aside->move = move;
   }
 
   const infer::Fitter& fitter_;
@@ -151,7 +149,7 @@ Result<JointFit> profiled(Predictor& predictor, const Study& study,
   }
   ASSIGN_OR_RETURN(
       fit, fit_jointly(predictor, study, effects, space.values(middle.u), BaseParameters::kFitted,
-                       no_nuisances(study), infer::kLongSearch, Loss::kRedescending));
+                       no_nuisances(study), kLongSearch, Loss::kRedescending));
   for (std::size_t k = 0; k < bent.size(); ++k) {
     fit.parameters[k].bent = bent[k];
     fit.parameters[k].standard_error *= bent[k];

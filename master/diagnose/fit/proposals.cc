@@ -7,15 +7,10 @@
 #include "common/effects/catalogue.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
-namespace {
-
-// A second one of a kind, for an error of the first's place or bend looks like one: of all that is
-// explained.
-constexpr double kSecondOfAKindShare = 0.05;
-
-}  // namespace
+namespace {}  // namespace
 
 double least_gain_of(const std::string& effect, const Study& study, double explained) {
   if (kind_of(effect) != effect) {

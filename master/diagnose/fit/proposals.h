@@ -15,18 +15,6 @@
 
 namespace gapfarm {
 
-// A further effect must also gain this share of what the others did: small systematic errors of
-// a strong effect's model look like weaker effects.
-inline constexpr double kLeastShare = 0.02;
-inline constexpr double kLeastSecondOfAKind = 20;  // nats
-inline constexpr double kAliasCosine = 0.9;
-inline constexpr std::size_t kMostEffects = 4, kMostAliases = 3;
-
-// That a mark is worth to be searched from: nats before the penalty, and of the best one's gain,
-// since no search makes up for less; its turn comes when the best is explained.
-inline constexpr double kWorthSearching = 8;
-inline constexpr double kWorthSearchingShare = 0.3;
-
 struct EffectCandidate {
   double gain = 0;  // net of the signature's penalty, nats
   Signature signature;

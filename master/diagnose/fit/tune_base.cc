@@ -9,13 +9,11 @@
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/study.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-// No more: a base alone that is left to settle takes up what an effect does (of a log of another
-// physics with one of 6 % too much to name it).
-constexpr int kTuningRounds = 6;
 constexpr double kGainStep = 0.02;
 constexpr double kSameSlope = 0.05;   // relative: a parameter that moves the ends as the gain does
 constexpr double kLeastAhead = 0.05;  // mean duty of a drive that does

@@ -10,6 +10,7 @@
 
 #include "common/base/result.h"
 #include "master/diagnose/fit/regression.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 
@@ -19,8 +20,7 @@ using Patch = std::array<double, 4>;
 // Whether two discs lie far enough apart to be two: beside one whose place, size or ratio is a
 // little wrong a second on its rim explains something.
 inline bool are_two_patches(const Patch& a, const Patch& b) {
-  constexpr double kLeastShare = 0.75;  // of the sum of the radii, between the centres
-  return std::hypot(a[0] - b[0], a[1] - b[1]) >= kLeastShare * (a[2] + b[2]);
+  return std::hypot(a[0] - b[0], a[1] - b[1]) >= kPatchesApart * (a[2] + b[2]);
 }
 
 // What is looked for: discs that promise to explain `least` squares or more, `most` of them, each

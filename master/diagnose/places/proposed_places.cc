@@ -10,16 +10,12 @@
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kWorthSketched = 12.5;  // of patches; where there are none it reaches 11
-// Times what a simulated disc does, or a part of it: where a fit would have more, or the opposite,
-// the data ask for no such disc.
-constexpr double kMostOfItself = 3;
 constexpr int kSeamSteps = 10;
-constexpr std::size_t kMostSketched = 3;
 // One that can be simulated and distinguished from none.
 constexpr double kLeastRadius_m = 0.05, kLeastRatio = 0.06, kMostRatio = 2.9;
 // The ratio is what the sketch is least sure of.
@@ -82,7 +78,7 @@ Result<std::vector<Signature>> Proposals::patches(const Regression& explained, d
   if (predictor_->excluded().count(kPatchEffect) > 0) return std::vector<Signature>();
   const double worth =
       std::max(beside ? kLeastSecondOfAKind : kWorthSketched, kWorthSearchingShare * most_gain);
-  ASSIGN_OR_RETURN(const auto places, patch_search_(explained, {kMostSketched, 2 * worth, beside}));
+  ASSIGN_OR_RETURN(const auto places, patch_search_(explained, {kFinalists, 2 * worth, beside}));
   std::vector<Patch> discs;
   for (const auto& [x, y, radius, ratio] : places) {
     for (const double power : kRatioPowers) {

@@ -7,12 +7,10 @@
 
 #include "common/effects/catalogue.h"
 #include "master/diagnose/fit/estimate.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
-
-// Where one line is not known better than by a shift's width, two this near are one.
-constexpr double kLeastApart_m = 0.3;
 
 double value_in(const Signature& seam, const char* key) {
   return seam.fixed.at(seam.effect + "." + key);

@@ -10,6 +10,7 @@
 
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -18,7 +19,6 @@ constexpr double kLevel = 0.01;  // greatest corrected p of a row
 constexpr std::size_t kMostRows = 12;
 constexpr double kOutlierSds = 3.2905;  // square root of the 0.999 quantile of chi2, 1 dof
 constexpr double kOutlierShare = 0.001;
-constexpr double kTrialsForCells = 4;  // a cell, on average, for cell means to be worth their cost
 constexpr std::size_t kFewestShown = 8;
 constexpr double kClearMotion = 5;    // s.d.s of the end by which a unit gain must move it
 constexpr int kMostDependences = 12;  // dependences taken out of one component
@@ -154,7 +154,7 @@ class Looker {
       v.groups.push_back(static_cast<int>(trials_[trial].cell));
       seen.insert(v.groups.back());
     }
-    if (double(n) < kTrialsForCells * double(seen.size())) v.groups = v.commands;
+    if (double(n) < kFewInCell * double(seen.size())) v.groups = v.commands;
     return v;
   }
 

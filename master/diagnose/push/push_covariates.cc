@@ -5,24 +5,13 @@
 #include "common/parameters/table.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/push/push_subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-// Of a piece whose outline and finger are known to this, m.
-constexpr double kOutline_m = 3e-4;
-// What a simulation of other physics gets wrong of a push, along it, across it and in turn, over
-// the finger's way after the touch (a turn: over that in gyration radii): of a smooth function of
-// the push, and of one push by itself.  The latter are root mean squares of the means of repeats by
-// a simulator with friction all over the face (docs/pushing.md).
-constexpr double kMisfit = 0.01;
 constexpr double kConditionMisfit[] = {0.02, 0.01, 0.01};
-// Of these, what two simulations with friction all over the face differ by in one push: with it
-// what repeats have in common of three logs by another simulator (scripts/foreign_pushes.sh, 57
-// degrees of freedom) has squares of 53, 57 and 64, and of 99 to 191 where nothing may be missed.
-constexpr double kSoundMisfit = 0.3;
-constexpr std::size_t kRepeats = 3;  // that a condition needs to be distinguished from noise
-constexpr double kFarArm = 2;        // gyration radii: beyond, the finger slips off
+constexpr double kFarArm = 2;  // gyration radii: beyond, the finger slips off
 
 double arm(const ResidualTrial& t) {
   return std::clamp(t.push.arm_m / t.push.gyration_m, -kFarArm, kFarArm);
@@ -147,7 +136,7 @@ Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, Study& study) {
     }
   }
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
-    if (study.cells[c].trials < kRepeats) continue;
+    if (study.cells[c].trials < kFewestAlike) continue;
     for (int component = 0; component < 3; ++component) {
       const auto here = [&](const ResidualTrial& t) {
         return t.cell == c ? misfit(t)[component] : 0.0;

@@ -11,12 +11,12 @@
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/push/push_subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kRetuningStep = 0.05;  // of the logarithm
-constexpr int kPushTuningRounds = 4;
 
 // What says how a piece is supported: the row of all pieces, followed by those of their own.
 struct SupportRows {
@@ -40,9 +40,6 @@ SupportRows support_rows(const Problem& problem) {
 // The rows that tuning moves.
 Result<std::vector<BaseParameter>> base_of(const Problem& problem, std::span<const Gene> genes,
                                            const std::set<std::size_t>& pieces) {
-  constexpr double kFactorPrior = 1, kFingerPrior = 1;
-  // Hardly seen in slow pushes: held close.
-  constexpr double kGroundPrior = 0.3;
   const SupportRows support = support_rows(problem);
   bool factor = genes.empty(), finger = genes.empty(), ground = false;
   for (const Gene& gene : genes) {
@@ -62,7 +59,7 @@ Result<std::vector<BaseParameter>> base_of(const Problem& problem, std::span<con
     }
     base.push_back({own ? support.own(piece) : support.of_all, kFactorPrior});
   }
-  if (finger) base.push_back({row_of(Push::kFingerFriction), kFingerPrior});
+  if (finger) base.push_back({row_of(Push::kFingerFriction), kFactorPrior});
   if (ground) base.push_back({row_of(Push::kGroundFriction), kGroundPrior});
   return base;
 }
@@ -222,7 +219,6 @@ Status tune_push_base(Predictor& predictor, bool keep, Study* study) {
 }
 
 std::vector<std::size_t> push_folds(const Study& study) {
-  constexpr std::size_t kFolds = 5;
   return mapped(study.trials, [&](const ResidualTrial& t) { return t.cell % kFolds; });
 }
 

@@ -9,6 +9,7 @@
 #include "common/parameters/table.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/push/push_geometry.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -170,11 +171,7 @@ DiagnosisSubject push_subject() {
   DiagnosisSubject s;
   s.scenario = "push";
   s.effects = &push_effect_diagnoses();
-  // The best of the catalogue gained 14.2 at most in twenty logs of a simulator that shares nothing
-  // with this one and from which nothing was missing, and 50 at least where something clear was
-  // (docs/pushing.md): two sound simulations differ by that much.
-  s.least_gain = 20;
-  s.unknown_log10_p = -4.2;
+  s.least_gain = kLeastGainOfPushes;
   s.farthest = 4;
   s.noise_tail = 7;
   s.base_moves = true;

@@ -9,11 +9,10 @@
 #include "common/score/fitness.h"
 #include "master/diagnose/places/where.h"
 #include "master/diagnose/push/push_subject.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr double kFewInPlace = 3;
 
 std::string pushes_of(const std::string& piece) {
   return piece == "all" ? "All pushes" : "Pushes of " + piece;
@@ -138,7 +137,7 @@ std::vector<std::string> push_cautions(const Study& study, const TrialLog& log) 
     add_caution(std::to_string(v.missed) + " of " + std::to_string(study.size()) +
                 " pushes do not touch their piece where the log has it; they say little.");
   }
-  if (v.typical_cell < kFewInPlace) {
+  if (v.typical_cell < kFewestAlike) {
     add_caution("Most pushes were done " +
                 (v.typical_cell <= 1 ? std::string("once")
                                      : "about " + plain_number(v.typical_cell) + " times") +

@@ -35,7 +35,6 @@ struct Estimate {
   std::optional<double> sd = {};
 };
 
-// An effect that the data show, in the order in which they were found.
 // How much faster one session drives than the base, as a share.
 struct SessionGain {
   double gain = 0;
@@ -44,12 +43,14 @@ struct SessionGain {
   std::string session = {};  // as the log calls it
 };
 
+inline constexpr std::size_t kMostAliases = 3;  // of an effect, that are listed
+
+// An effect that the data show, in the order in which they were found.
 struct NamedEffect {
   std::string name;
-  std::vector<std::string>
-      aliases;               // at most three effects that these data cannot distinguish from it
-  std::string alias_reason;  // one sentence; empty without aliases
-  double confidence = 0;     // that it, or one of its aliases, is there, [0, 1]
+  std::vector<std::string> aliases;  // effects that these data cannot distinguish from it
+  std::string alias_reason;          // one sentence; empty without aliases
+  double confidence = 0;             // that it, or one of its aliases, is there, [0, 1]
   std::vector<Estimate> parameters;
   // Mean log score lost against the floor, nats a trial, on trials that the fit did not see.
   double gap_before = 0;

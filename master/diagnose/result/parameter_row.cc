@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "master/infer/settings.h"
+
 namespace gapfarm {
 
 ParameterRow row_of(const Parameter& p, std::optional<double> before, double after) {
@@ -14,14 +16,13 @@ ParameterRow row_of(const Parameter& p, std::optional<double> before, double aft
 }
 
 BoundHit bound_hit(const ParameterRow& row) {
-  constexpr double kNear = 1e-3;  // of the range
   const double range = row.upper - row.lower;
   const bool round = row.key.ends_with(".direction") || row.key == "direction";
   if (!row.choice.empty() || round || !(range > 0) || !std::isfinite(row.after)) {
     return BoundHit::kNone;
   }
-  if (row.lower != 0 && row.after - row.lower <= kNear * range) return BoundHit::kLower;
-  if (row.upper != 0 && row.upper - row.after <= kNear * range) return BoundHit::kUpper;
+  if (row.lower != 0 && row.after - row.lower <= kAtBound * range) return BoundHit::kLower;
+  if (row.upper != 0 && row.upper - row.after <= kAtBound * range) return BoundHit::kUpper;
   return BoundHit::kNone;
 }
 

@@ -6,15 +6,12 @@
 
 #include "master/diagnose/conclusions/findings.h"
 #include "master/infer/certificate.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
 
 using infer::Coordinate;
-
-// Standard deviation of what is explained before anything else, in standard deviations of the
-// noise: as good as none.
-constexpr double kAnySize = 100;
 
 infer::Space base_space(const Study& study, BaseParameters base, Eigen::Index columns) {
   std::vector<Coordinate> coordinates = infer::columns(columns);
@@ -63,7 +60,7 @@ Eigen::MatrixXd columns_of(const Evidence& evidence, const std::vector<Signature
   for (const Signature& s : first) {
     for (Eigen::Index k = 0; k < s.columns.cols(); ++k) {
       const double norm = s.columns.col(k).norm();
-      if (norm > 0) columns.push_back(s.columns.col(k) * (kAnySize / norm));
+      if (norm > 0) columns.push_back(s.columns.col(k) * (kAsGoodAsFree / norm));
     }
   }
   Eigen::MatrixXd all(evidence.nuisances.rows(),
@@ -92,7 +89,7 @@ Competition::Competition(const DiagnosisRequest& of, const Study& study, const E
   observations_ = observations_of(study, columns, infer::Loss::kStudent);
   observations_.fold = of.subject.folds(study);
   observations_.least_scale =
-      moves ? infer::kLeastScale : infer::kBestScaleOfGaussian * std::sqrt(kLeastLeftoverScale);
+      moves ? kLeastNoiseScale : infer::kBestScaleOfGaussian * std::sqrt(kLeastLeftoverScale);
   observations_.most_scale =
       moves ? INFINITY : infer::kBestScaleOfGaussian * std::sqrt(kMostLeftoverScale);
   base_ = base_space(study, base, columns.cols());
@@ -109,7 +106,7 @@ std::vector<Coordinate> Competition::coordinates_of(const std::string& name) con
     c.size = size.size * (p.unit == "m" ? study_.scale : 1);
     const bool is_place = std::ranges::any_of(
         effect.places, [&](const auto& place) { return std::string_view(place.key) == size.key; });
-    if (!effect.searched.empty() && !is_place) c.prior_sd = infer::kPriorSizes;
+    if (!effect.searched.empty() && !is_place) c.prior_sd = kPriorSizes;
     if (effect.polar) {
       c.kind = Coordinate::Kind::kPolar;
       c.direction_row = table.row(effect.polar->direction);

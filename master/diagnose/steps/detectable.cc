@@ -6,11 +6,10 @@
 #include "common/math/algebra.h"
 #include "master/diagnose/steps/competition.h"
 #include "master/infer/certificate.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
-
-constexpr double kUnheld = 100;  // standard deviation of a coordinate without a prior, in its units
 
 // Standard deviation of what a model leaves, over what the whitener says.
 double noise_of(const infer::Model& model) { return model.fit.scale / infer::kBestScaleOfGaussian; }
@@ -25,7 +24,7 @@ Eigen::MatrixXd in_noise(const Study& study, const Eigen::MatrixXd& slopes, doub
 // Columns in standard deviations of their coordinates' priors.
 Eigen::MatrixXd in_priors(Eigen::MatrixXd slopes, const Eigen::VectorXd& precision) {
   for (Eigen::Index k = 0; k < slopes.cols(); ++k) {
-    slopes.col(k) *= precision[k] > 0 ? 1 / std::sqrt(precision[k]) : kUnheld;
+    slopes.col(k) *= precision[k] > 0 ? 1 / std::sqrt(precision[k]) : kAsGoodAsFree;
   }
   return slopes;
 }

@@ -39,7 +39,7 @@ std::vector<std::string> aliases_of(const DiagnosisRequest& of, const std::strin
     if (name == effect) continue;
     const infer::PairedGain ahead =
         infer::gain_over(best.model, other.model, contest.base.fit.u.size());
-    if (ahead.sum < infer::kSureGain * ahead.se && other.gain > best.gain / 2) {
+    if (ahead.sum < kSureGain * ahead.se && other.gain > best.gain / 2) {
       aliases.push_back(name);
     }
   }
@@ -105,7 +105,7 @@ class Selection {
   Result<Found> run() {
     ASSIGN_OR_RETURN(auto base, fitted(competition_.base(), competition_.base().from(study_.base)));
     found_.emplace(Found{base, base, {}, {}, {}, {}, {}});
-    while (found_->chosen.size() < kMostEffects) {
+    while (found_->chosen.size() < kMostNames) {
       ASSIGN_OR_RETURN(const auto more, add_best());
       if (!more) break;
     }
@@ -119,7 +119,7 @@ class Selection {
     const infer::Fitter fitter(competition_.forward(), competition_.observations(), space);
     ASSIGN_OR_RETURN(auto fit, fitter.start(from));
     if (!std::isfinite(fit.score)) return of_.predictor.failed("the model to begin at");
-    if (Status s = fitter.improve(&fit, infer::kLongSearch); !s) return s.error();
+    if (Status s = fitter.improve(&fit, kLongSearch); !s) return s.error();
     return infer::model_of(competition_.forward(), competition_.observations(), std::move(space),
                            std::move(fit));
   }
@@ -162,7 +162,7 @@ class Selection {
     for (const EffectCandidate& mark : marks) {
       if (mark.gain < kWorthSearchingShare * best) break;
       // A search may do better than slopes say, but not by more than they are trusted for.
-      const double most = infer::kMostTrust * mark.gain;
+      const double most = kMostTrust * mark.gain;
       if (most < least_gain_of(mark.effect(), study_, this->explained())) continue;
       if (not_these_.count(mark.effect())) continue;
       best = std::max(best, mark.gain);
@@ -189,7 +189,7 @@ class Selection {
 
   bool enters(const infer::Contender& best, const std::string& name) const {
     return best.gain >= least_gain_of(name, study_, explained()) &&
-           best.gain >= infer::kLeastSure * best.gain_se;
+           best.gain >= kLeastSure * best.gain_se;
   }
 
   // Slopes of the chosen effects at the present model.
@@ -215,7 +215,7 @@ class Selection {
       ASSIGN_OR_RETURN(auto without, fitted(std::move(space), u));
       const infer::PairedGain gain =
           infer::gain_over(found_->model, without, competition_.base().dimensions());
-      if (gain.sum >= of_.subject.least_gain && gain.sum >= infer::kSureGain * gain.se) {
+      if (gain.sum >= of_.subject.least_gain && gain.sum >= kSureGain * gain.se) {
         found_->chosen[k].gain = gain.sum;
         first += size_of(k++);
         continue;
@@ -283,7 +283,7 @@ Result<JointFit> estimate(const DiagnosisRequest& of, const Explanation& named,
   const Study& study = named.study();
   const Eigen::MatrixXd& nuisances = named.evidence->nuisances;
   const auto fit_from = [&](const Overrides& at) {
-    return fit_jointly(of.predictor, study, named.chosen, at, base, nuisances, infer::kLongSearch);
+    return fit_jointly(of.predictor, study, named.chosen, at, base, nuisances, kLongSearch);
   };
   auto fit = fit_from(start);
   if (!fit) return fit;
@@ -330,9 +330,9 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Study& from
       of.predictor, named.study(), std::vector<Signature>(), named.evidence->base);
   screening->explained = sum_of_gains(named.chosen);
   if (named.chosen.empty()) return {};
-  ASSIGN_OR_RETURN(named.estimates, fit_jointly(of.predictor, named.study(), named.chosen,
-                                                named.study().base, BaseParameters::kFitted,
-                                                named.evidence->nuisances, infer::kLongSearch));
+  ASSIGN_OR_RETURN(named.estimates,
+                   fit_jointly(of.predictor, named.study(), named.chosen, named.study().base,
+                               BaseParameters::kFitted, named.evidence->nuisances, kLongSearch));
   emit_fit(of, *named.estimates);
   return {};
 }

@@ -7,16 +7,10 @@
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
-
-// Fourth moment of whitened residuals over their squared second: 3 of a Gaussian, with a sampling
-// error of 0.12 on 600 trials.
-constexpr double kTailsWorthFitting = 3.6;
-// Nats over all trials that two tail weights must gain; Gaussian residuals stay below 6, 155 drives
-// of a real robot gain 13.
-constexpr double kLeastTailGain = 10;
 
 struct Tails {
   std::vector<NoiseEstimate> noise;  // one a nested fit
@@ -33,8 +27,7 @@ std::optional<Tails> tails_of(const DiagnosisRequest& of, const Evidence& eviden
   // Sessions' own gains would pass for tails.
   if (evidence.study.session_spread > 0) return std::nullopt;
   const NestedFit& last = nested.back();
-  if (residual_kurtosis(last.study.whiten(last.fit.residuals)) < kTailsWorthFitting)
-    return std::nullopt;
+  if (residual_kurtosis(last.study.whiten(last.fit.residuals)) < kHeavyTails) return std::nullopt;
   const auto fit = [&](const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                        bool tails) {
     return fit_predictive_noise(study.trials, residuals, study.noise, of.subject,
@@ -114,7 +107,7 @@ const FoundSpread* instead_of_tails(const Explanation& named) {
 
 // Not worse than what was reached on trials that the fit did not see, and there is more to be had
 // where that still depends on something.
-double within_reach(const DiagnosisRequest& of, const Refit& refit) {
+double within_reach(const Refit& refit) {
   const Judgement& judged = refit.judged;
   double reached = -INFINITY, more = 0;
   for (const NestedFit& n : refit.nested) reached = std::max(reached, mean(n.scores));
@@ -122,7 +115,7 @@ double within_reach(const DiagnosisRequest& of, const Refit& refit) {
     if (found.row != nullptr) reached = std::max(reached, mean(found.scores));
   }
   for (const Leftover& l : judged.left) {
-    if (l.log10_p < of.subject.unknown_log10_p) more = std::max(more, l.excess);
+    if (l.log10_p < kUnknownLog10P) more = std::max(more, l.excess);
   }
   return reached + more / static_cast<double>(judged.named.study().size());
 }
@@ -149,7 +142,7 @@ Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std:
   refit.floor = outliers != nullptr ? mean(outliers->scores)
                 : tails             ? tails->perfect
                                     : floor_score(refit.nested.back().study, of.outlier_share());
-  refit.floor = std::max(refit.floor, within_reach(of, refit));
+  refit.floor = std::max(refit.floor, within_reach(refit));
   return refit;
 }
 

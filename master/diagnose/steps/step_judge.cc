@@ -10,6 +10,7 @@
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/correction/fit.h"
 #include "master/diagnose/steps/step_parts.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -18,13 +19,13 @@ constexpr double kLeastQuantum_m = 4e-4;
 constexpr const char* kRounding = "pose_quantisation";
 constexpr std::size_t kNearestAlone = 3;
 
-NearMiss near_miss(const DiagnosisRequest& of, std::vector<std::string> effects, double gain,
+NearMiss near_miss(std::vector<std::string> effects, double gain,
                    const std::vector<Leftover>& left) {
   NearMiss miss{std::move(effects), gain, 0, "", ""};
   const bool several = miss.effects.size() > 1;
   miss.text = listed(miss.effects) + (several ? " together" : "") + " would explain " +
               plain_number(std::round(gain)) + " nats, but ";
-  if (!left.empty() && left.front().log10_p < of.subject.unknown_log10_p) {
+  if (!left.empty() && left.front().log10_p < kUnknownLog10P) {
     miss.left = left.front().excess;
     miss.left_on = left.front().covariate;
     miss.text += std::string("what ") + (several ? "they leave" : "it leaves") +
@@ -37,12 +38,12 @@ NearMiss near_miss(const DiagnosisRequest& of, std::vector<std::string> effects,
 }
 
 // Before anything is given up: what was chosen together, and the best alone.
-std::vector<NearMiss> nearest(const DiagnosisRequest& of, const Screening& screening, double nats,
+std::vector<NearMiss> nearest(const Screening& screening, double nats,
                               const std::vector<Leftover>& left) {
   const Evidence& evidence = *screening.found.evidence;
   std::vector<NearMiss> nearest;
   std::vector<std::string> together = mapped(screening.found.chosen, &EffectCandidate::effect);
-  if (!together.empty()) nearest.push_back(near_miss(of, together, nats, left));
+  if (!together.empty()) nearest.push_back(near_miss(together, nats, left));
   for (std::size_t k = 0; k < std::min(kNearestAlone, screening.alone.size()); ++k) {
     const EffectCandidate& alone = screening.alone[k];
     const bool agrees = together.size() == 1 && together.front() == alone.effect();
@@ -51,8 +52,7 @@ std::vector<NearMiss> nearest(const DiagnosisRequest& of, const Screening& scree
     Eigen::MatrixXd columns = alone.signature.columns;
     evidence.study.drop_ignored(columns);
     with.add(columns);
-    nearest.push_back(
-        near_miss(of, {alone.effect()}, alone.gain, leftovers(with, evidence.blocks)));
+    nearest.push_back(near_miss({alone.effect()}, alone.gain, leftovers(with, evidence.blocks)));
   }
   return nearest;
 }
@@ -69,16 +69,6 @@ Verdict with_oddities(Verdict verdict, const Explanation& found) {
   }
   return verdict;
 }
-
-// A parameter within this share of its range from an end sits there.
-constexpr double kAtBound = 1e-3;
-// Nats a trial: the worst of 11 practice logs and of the real forward log keep 0.2 with their
-// effects.
-constexpr double kMostMissed = 3;
-// The same where nothing is named: nulls of push logs by a physics that is not ours, and by the
-// tangram's, keep 0 to 0.8, and logs of which one outline is 5 % too large 2.1 to 2.9.
-constexpr double kMostOfNothing = 1.3;
-constexpr double kLittleClosed = 0.02;  // of the gap
 
 bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value) {
   if (row.kind != ParameterKind::kReal || place_of(effects, row) != nullptr) return false;
@@ -114,17 +104,16 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
   return left;
 }
 
-Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Judgement judged) {
+Judgement judge_again(const Proposals& catalogue, Judgement judged) {
   Explanation& named = judged.named;
   const bool odd = !named.odd_readings.empty() || !named.odd_drives.empty();
-  const double unknown = of.subject.unknown_log10_p;
   if (named.chosen.empty()) {
     const bool others = named.names_anything();
     named.estimates.reset();
     const Regression left = explained_by(catalogue, named);
     judged.left = all_leftovers(named, left);
     judged.scale = leftover_scale(left);
-    judged.verdict = judge_verdict(others, explained_nats(catalogue, left), judged.left, unknown);
+    judged.verdict = judge_verdict(others, explained_nats(catalogue, left), judged.left);
     if (odd && judged.verdict == Verdict::kNone) judged.verdict = Verdict::kUnknown;
     if (others && (odd || judged.verdict == Verdict::kUnknown)) {
       judged.verdict = Verdict::kEffectAndUnknown;
@@ -140,7 +129,7 @@ Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Ju
   left.add(slopes);
   judged.left = all_leftovers(named, left);
   judged.scale = leftover_scale(left);
-  judged.verdict = judge_verdict(true, explained_nats(catalogue, left), judged.left, unknown);
+  judged.verdict = judge_verdict(true, explained_nats(catalogue, left), judged.left);
   if (odd || judged.verdict == Verdict::kUnknown) judged.verdict = Verdict::kEffectAndUnknown;
   return judged;
 }
@@ -174,7 +163,7 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
       std::any_of(named.chosen.begin(), named.chosen.end(),
                   [](const EffectCandidate& c) { return kind_of(c.effect()) != c.effect(); });
   judged.verdict = judge_verdict(named.names_anything(), nats, judged.left,
-                                 of.subject.unknown_log10_p, two ? kWrongShareOfTwo : kWrongShare);
+                                 two ? kWrongShareOfTwo : kWrongShare);
   if (on_grid && !names_grid) {
     named.odd_readings =
         "The logged positions lie on a grid, which nothing that was looked for explains.";
@@ -186,7 +175,7 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
   }
   for (const NearMiss& refused : screening.refused) judged.cautions.push_back(refused.text);
   if (judged.verdict == Verdict::kUnknown || judged.verdict == Verdict::kEffectAndUnknown) {
-    judged.nearest = nearest(of, screening, by_means, judged.left);
+    judged.nearest = nearest(screening, by_means, judged.left);
   }
   judged.nearest.insert(judged.nearest.end(), screening.refused.begin(), screening.refused.end());
   if (judged.verdict == Verdict::kUnknown) {
@@ -295,7 +284,7 @@ std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<Ne
     const std::vector<double>&with = nested[before + k + 1].scores,
           &without_it = nested[before + k].scores;
     const double gain = mean(with) - mean(without_it);
-    if (gain > 0 && (gain > kLittleClosed * gap || clearly_better(with, without_it))) continue;
+    if (gain > 0 && (gain > kLeastShare * gap || clearly_better(with, without_it))) continue;
     if (gain < least) worst = k;
     least = std::min(least, gain);
   }

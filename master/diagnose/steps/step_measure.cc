@@ -11,17 +11,13 @@
 #include "master/diagnose/evidence/residuals.h"
 #include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/steps/step_parts.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
 
 constexpr int kLatencyRounds = 4;
 constexpr double kPathInterval_s = 0.005;
-constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
-constexpr double kLeastLagGain = 14;      // it stands for all samples of a path, which go together
-// For so long another robot may roll on by itself: what a late reading's age is counted from is its
-// recorder's secret.
-constexpr double kCoasting_s = 0.04;
 constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
 
 // Of every trial just before its motors stop, in the axes of its predicted end; none where that
@@ -199,7 +195,7 @@ double DiagnosisRequest::frame_of(const std::string& key, const Overrides& at) c
 // A late camera reads a pose before the motion has ended; the next reading shows it.
 Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial) {
   const Study& study = partial.study();
-  if (!of.knows("pose_latency") || study.gaps.size() < kFewestGaps) return partial;
+  if (!of.knows("pose_latency") || study.gaps.size() < kFewestReadings) return partial;
   ASSIGN_OR_RETURN(const auto velocity, end_velocities(of, study));
   if (velocity.empty()) return partial;
   partial.latency = fit_latency(study, velocity);
@@ -235,7 +231,7 @@ Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial
   }
   if (!lag) return lag.error();
   partial.lag = *lag;
-  if (partial.lag.gain < kLeastLagGain) partial.lag.gain = 0;
+  if (partial.lag.gain < kLeastLatencyGain) partial.lag.gain = 0;
   if (partial.lag.gain == 0) return partial;
   const double tau = partial.lag.tau_s;
   const double half = kNormal90 * std::hypot(partial.lag.standard_error_s, kLagError * tau);

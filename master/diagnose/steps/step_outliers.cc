@@ -10,11 +10,10 @@
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
-
-constexpr double kLeastOutlierShare = 0.03;  // of what the effects on the means explain
 
 // Trials that something else which is named makes outliers show nothing of an effect that would.
 void ignore_contaminated(const DiagnosisRequest& of, const Explanation& partial, Study* study) {
@@ -33,9 +32,6 @@ void ignore_contaminated(const DiagnosisRequest& of, const Explanation& partial,
     }
   }
 }
-
-// Nats over all trials: as much as speaks for slips that are named.
-constexpr double kLeastGain = 11;
 
 std::string percent(double share) { return plain_number(std::round(1000 * share) / 10) + " %"; }
 std::string digits(double value) { return plain_number(rounded_to_digits(value, 2)); }
@@ -123,7 +119,7 @@ std::string outlier_text(const OutlierDrives& outliers) {
 std::optional<PredictedOutliers> look_for_outliers(const DiagnosisRequest& of, const Study& study,
                                                    const OutlierLesson& lesson) {
   const OutlierData data{study, logged_motions(of.problem), lesson.ends, of.outlier_share()};
-  const auto fit = fit_outliers(data, lesson.residuals, lesson.learn, study.noise, kLeastGain);
+  const auto fit = fit_outliers(data, lesson.residuals, lesson.learn, study.noise, kLeastSlipGain);
   if (!fit) return {};
   PredictedOutliers found{fit->outliers, fit->noise, std::vector<double>(study.size(), 0.0), {}};
   for (std::size_t i = 0; i < study.size(); ++i) {

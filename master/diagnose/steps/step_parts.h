@@ -72,7 +72,7 @@ double sum_of_gains(const std::vector<EffectCandidate>& chosen);
 // What is left beside what is explained, also what repeats of a trial have in common.
 std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regression& explained);
 // What the remaining effects leave at their estimates, where some were dropped.
-Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Judgement judged);
+Judgement judge_again(const Proposals& catalogue, Judgement judged);
 
 // Nothing is named any more; readings are as logged.
 Explanation naming_nothing(Explanation explanation);

@@ -10,6 +10,7 @@
 #include "master/diagnose/fit/profile.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/steps/watch.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -50,7 +51,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
                                            const std::vector<std::size_t>& folds) {
   const Study& study = named.study();
   const Eigen::MatrixXd none = no_nuisances(study);
-  const int base_rounds = of.options.keep_base ? 0 : infer::kLongSearch;
+  const int base_rounds = of.options.keep_base ? 0 : kLongSearch;
   std::vector<NestedFit> nested;
   if (named.as_logged) {
     const Study& logged = *named.as_logged;
@@ -69,7 +70,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
     const Study& fitted_in = alone ? study : beside;
     ASSIGN_OR_RETURN(auto fit,
                      fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted,
-                                 none, alone ? base_rounds : infer::kLongSearch));
+                                 none, alone ? base_rounds : kLongSearch));
     if (!alone && count == named.chosen.size()) {
       ASSIGN_OR_RETURN(fit, profiled(of.predictor, fitted_in, effects, std::move(fit)));
     }
@@ -89,7 +90,7 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
 Result<JointFit> estimate_beside(const DiagnosisRequest& of, const Explanation& named,
                                  const NestedFit& with_base) {
   return fit_jointly(of.predictor, named.study(), named.chosen, with_base.fit.at,
-                     BaseParameters::kHeld, named.evidence->nuisances, infer::kLongSearch,
+                     BaseParameters::kHeld, named.evidence->nuisances, kLongSearch,
                      Loss::kRedescending);
 }
 
@@ -106,7 +107,7 @@ Result<Refit> with_correction(const DiagnosisRequest& of, Refit refit,
   Overrides start = study.base;
   use_estimates(of, named, effects, &start);
   auto fit = fit_jointly(of.predictor, study, effects, start, BaseParameters::kFitted,
-                         no_nuisances(study), infer::kLongSearch);
+                         no_nuisances(study), kLongSearch);
   if (!fit && fit.error().code == ErrorCode::kSimulation) return refit;
   if (!fit) return fit.error();
   std::vector<std::string> names = mapped(effects, &EffectCandidate::effect);
@@ -210,7 +211,7 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
         named.estimates = std::move(fit);
       }
       if (named.chosen.size() < found) {
-        refit.judged = judge_again(of, *screening.catalogue, std::move(refit.judged));
+        refit.judged = judge_again(*screening.catalogue, std::move(refit.judged));
       }
       ASSIGN_OR_RETURN(auto corrected, with_correction(of, std::move(refit), folds));
       refit = with_floor(of, std::move(corrected), folds);

@@ -14,16 +14,15 @@
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/infer/compete.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
 
-constexpr std::size_t kLeastFolds = 5, kMostFolds = 8;
-
 // Sessions, joined where there are many and cut into blocks where there are few.
 std::vector<std::size_t> residual_folds(const Study& study) {
   const std::size_t sessions = std::max<std::size_t>(study.sessions, 1);
-  const std::size_t blocks = (kLeastFolds + sessions - 1) / sessions;
+  const std::size_t blocks = (kFolds + sessions - 1) / sessions;
   std::vector<std::size_t> counts(sessions, 0), seen(sessions, 0), folds;
   for (const ResidualTrial& t : study.trials) ++counts[t.session];
   for (const ResidualTrial& t : study.trials) {

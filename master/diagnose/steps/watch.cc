@@ -10,6 +10,7 @@
 #include "common/math/statistics.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -158,7 +159,7 @@ void emit_verdict(const DiagnosisRequest& of, const Judgement& judged) {
   emit_choice(of, judged.named, has_warnings);
   Finding finding{"what is left", "", {"what is left depends on", "log10 p"}, {}};
   for (const Leftover& l : judged.left) {
-    if (l.log10_p < of.subject.unknown_log10_p) {
+    if (l.log10_p < kUnknownLog10P) {
       finding.rows.emplace_back(l.covariate, three_digits(l.log10_p));
     }
   }

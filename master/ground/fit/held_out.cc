@@ -7,6 +7,7 @@
 #include "common/base/ranges.h"
 #include "common/random/stream.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -121,7 +122,7 @@ std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint
   const auto runs = blocks_of_runs(windows);
   const std::size_t drawn = std::max<std::size_t>(1, runs.size() - std::min(spared, runs.size()));
   const double weight = static_cast<double>(runs.size()) / static_cast<double>(drawn);
-  std::vector<std::vector<double>> all(kGroundDraws, std::vector<double>(windows.blocks, 0.0));
+  std::vector<std::vector<double>> all(kDraws, std::vector<double>(windows.blocks, 0.0));
   for (std::vector<double>& times : all) {
     for (std::size_t d = 0; d < drawn; ++d) {
       const auto [first, count] = runs[stream.below(runs.size())];

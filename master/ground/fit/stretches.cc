@@ -6,15 +6,12 @@
 #include <map>
 
 #include "common/base/ranges.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kRareLengthShare = 0.25;  // of what windows of the commonest length cover
-constexpr double kEnoughWindows = 10;      // for a length to count in full
-// What is a run's own (its floor, its way, how its clock stands) is in every part of it: runs are
-// not cut where these are left to fit to.
-constexpr std::size_t kEnoughRuns = 3;
 
 // Where the first and last window of each run begin and end.
 std::map<std::size_t, std::array<double, 2>> spans_of(std::span<const Trial> windows) {
@@ -94,11 +91,11 @@ std::vector<double> window_weights(std::span<const std::size_t> lengths) {
   std::map<std::size_t, double> count;
   for (const std::size_t length : lengths) ++count[length];
   double shares = 0;
-  for (const auto& [length, n] : count) shares += std::min(1.0, n / kEnoughWindows);
+  for (const auto& [length, n] : count) shares += std::min(1.0, n / kEnoughToScatter);
   const auto all = static_cast<double>(lengths.size());
   return mapped(lengths, [&](std::size_t length) {
     const double n = count[length];
-    return all / shares * std::min(1.0, n / kEnoughWindows) / n;
+    return all / shares * std::min(1.0, n / kEnoughToScatter) / n;
   });
 }
 
@@ -107,8 +104,10 @@ std::vector<std::size_t> held_out_stretches(std::span<const Trial> windows,
   const auto span_s = spans_of(windows);
   std::size_t units = 0;
   std::map<std::size_t, std::size_t> places = places_of(span_s, runs, true, &units);
-  if (units < kEnoughRuns) places = places_of(span_s, runs, false, &units);
-  if (units < kEnoughRuns) return equal_parts(windows, count);
+  // What is a run's own (its floor, its way, how its clock stands) is in every part of it: runs are
+  // not cut where these are left to fit to.
+  if (units < kFewestAlike) places = places_of(span_s, runs, false, &units);
+  if (units < kFewestAlike) return equal_parts(windows, count);
   count = std::min(count, units);
   return mapped(windows, [&](const Trial& w) { return count * places[*w.run] / units; });
 }

@@ -8,13 +8,12 @@
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr int kVariationRounds = 60;
-constexpr std::size_t kLeastOfLength = 10;
-constexpr std::size_t kMostFolds = 5;
 constexpr double kCovered = 0.9;  // of the windows that are held out
 constexpr double kLeastError = 1e-12;
 
@@ -94,7 +93,7 @@ Mixed likeliest(const Windows& windows, const Eigen::MatrixXd& begin) {
 double widening(const Windows& windows, const Eigen::MatrixXd& begin) {
   std::set<std::size_t> runs;
   for (const EndedWindow* w : windows) runs.insert(w->run);
-  const std::size_t folds = std::min(runs.size(), kMostFolds);
+  const std::size_t folds = std::min<std::size_t>(runs.size(), kFolds);
   if (folds < 2) return 1;
   std::vector<double> squares;
   for (std::size_t fold = 0; fold < folds; ++fold) {
@@ -119,7 +118,7 @@ double widening(const Windows& windows, const Eigen::MatrixXd& begin) {
 Variation variation_of(const std::vector<EndedWindow>& windows, const Eigen::MatrixXd& begin) {
   std::map<std::size_t, std::vector<double>> seconds;
   for (const EndedWindow& w : windows) seconds[w.length].push_back(w.seconds);
-  std::erase_if(seconds, [](const auto& of) { return of.second.size() < kLeastOfLength; });
+  std::erase_if(seconds, [](const auto& of) { return of.second.size() < kEnoughToScatter; });
   Windows used;
   for (const EndedWindow& w : windows) {
     if (seconds.count(w.length) > 0) used.push_back(&w);

@@ -12,6 +12,7 @@
 #include "common/robot/robot_drive.h"
 #include "master/ground/search.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -71,7 +72,7 @@ LoopWindows loop_windows(const GroundRobot& robot, const RunLog& log) {
   LoopWindows windows;
   for (const LoggedRun& run : log.runs) {
     if (run.commands.empty() || run.wheel_speeds.empty()) continue;
-    cut_run(robot, log, run, log.runs.size() < kRunsToDraw, &windows);
+    cut_run(robot, log, run, log.runs.size() < kEnoughToScatter, &windows);
   }
   return windows;
 }
@@ -167,15 +168,15 @@ WheelLoop measure_wheel_loop(const GroundRobot& robot, const RunLog& log, const 
   const auto [share, expected] = shares_of(here, {}, loop_of({}), fastest);
   Stream stream({seed, Purpose::kStatistics, 3, 0, 0});
   double sum = 0, squares = 0;
-  for (int d = 0; d < kGroundDraws; ++d) {
+  for (int d = 0; d < kDraws; ++d) {
     const Eigen::Vector2d loop = loop_of(draw_again(there.blocks, &stream));
     const Shares drawn = shares_of(here, draw_again(here.blocks, &stream), loop, fastest);
     const double change = drawn.share / drawn.expected - 1;
     sum += change;
     squares += change * change;
   }
-  const double mean = sum / kGroundDraws;
-  const double variance = std::max(0.0, squares / kGroundDraws - mean * mean);
+  const double mean = sum / kDraws;
+  const double variance = std::max(0.0, squares / kDraws - mean * mean);
   const double change = share / expected - 1, wide = 1.645 * std::sqrt(variance);
   result.share = share;
   result.expected = expected;

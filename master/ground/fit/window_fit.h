@@ -13,6 +13,7 @@
 #include "common/score/kinematic_body.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/hypotheses.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 
@@ -91,8 +92,6 @@ struct OffsetFit {
 };
 
 inline const std::optional<GroundReference> kNoReference;
-
-inline constexpr double kWindowTail = 4;  // degrees of freedom of a residual's density
 
 // Of a residual in a step of least squares, its scale being s.
 inline double window_weight(double r, double s) {

@@ -8,6 +8,7 @@
 #include "common/math/algebra.h"
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -15,8 +16,7 @@ namespace {
 constexpr double kBefore_s = 0.3;  // of commands that still act
 // Times a window's residuals may grow by for what a mean window has; none: they do not.
 constexpr double kGrowth[] = {0, 0.3, 1, 3, 10, 30};
-constexpr double kOffsetShare = 0.1;  // that they differ by from run to run
-constexpr double kOpenOffset = 1;     // share; standard deviation before the log has its say
+constexpr double kOpenOffset = 1;  // share; standard deviation before the log has its say
 constexpr int kOffsetRounds = 3;
 
 double delay_of(const WindowFit& fit) {
@@ -50,7 +50,8 @@ std::vector<KinematicRow> command_offsets(const GroundRobot& robot) {
   if (asked_by_channels(robot).cols() == 0) return rows;
   for (const char* what : {"ahead", "turn"}) {
     for (const char* by : {"_by_turn", "_by_side", "_by_turn_speed"}) {
-      rows.push_back({std::string(what) + by, 0, kOffsetShare, "share", "-", false, kOpenOffset});
+      rows.push_back(
+          {std::string(what) + by, 0, kAddedByTurnsSd, "share", "-", false, kOpenOffset});
     }
   }
   return rows;

@@ -10,11 +10,11 @@
 #include "master/ground/fit/held_out.h"
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kMostTooSmall = 4;  // a deviation that a matcher states
 // Of every row's variance, of the middle one's: candidates.
 constexpr double kLeastNoises[] = {0.1, 0.3, 1, 3, 10, 100};
 constexpr double kLeastCurvature = 0.3;  // of the weights; of Student's own residuals 0.71
@@ -147,9 +147,9 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bo
   const Eigen::MatrixXd P = prior_precision(fit.rows);
   const Eigen::VectorXd away = fit.values - nominals(fit.rows);
   const std::vector<std::vector<double>> all_times = draw_blocks(windows_, seed, 1);
-  Eigen::MatrixXd drawn(n, kGroundDraws);
+  Eigen::MatrixXd drawn(n, kDraws);
   Stream stream({seed, Purpose::kStatistics, 4, 0, 0});
-  for (int d = 0; d < kGroundDraws; ++d) {
+  for (int d = 0; d < kDraws; ++d) {
     Eigen::VectorXd from = away;
     for (Eigen::Index k = 0; k < n; ++k) {
       const FitRow& row = fit.rows[k];

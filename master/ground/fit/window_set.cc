@@ -9,16 +9,10 @@
 
 #include "common/recordings/run.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
-
-// kRunsToDraw of increments, which know of nothing that lasts: tens of stretches say better how far
-// values scatter.
-constexpr std::size_t kLeastRelativeBlocks = 30;
-// Of wheels that roll: what they slip by in the root of a metre of their way, m and rad. OptiOdom's
-// and a Create's whole runs end 0.01 to 0.05 off (docs/evidence/ground.md).
-constexpr double kSlip = 0.03;
 
 bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
   if (a.size() - from_a != b.size()) return false;
@@ -143,7 +137,7 @@ void add_blocks(const RunLog& log, WindowSet* set) {
   // Stretches of one length, none over two runs.
   std::vector<int>& first = set->run_blocks;
   first.resize(log.runs.size());
-  const std::size_t least = log.relative ? kLeastRelativeBlocks : kRunsToDraw;
+  const std::size_t least = log.relative ? kLeastRelativeBlocks : kEnoughToScatter;
   const bool few = log.runs.size() < least;
   for (std::size_t i = 0; i < log.runs.size(); ++i) {
     first[i] = set->blocks;

@@ -10,6 +10,7 @@
 #include "master/ground/catalogue.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -22,8 +23,6 @@ constexpr double kShares[] = {0.03, 0.06, 0.12, 0.22, 0.35, 0.5, 0.65, 0.78, 0.8
 // over what the places scatter by.
 constexpr double kMiddles[] = {0.08, 0.25, 0.42, 0.58, 0.75, 0.92};
 constexpr double kRadii[] = {0.35, 0.6, 1};
-constexpr double kLargest = 2;               // the same of one that may be named
-constexpr double kLeastInside = 0.015;       // of the wheels' places, and outside
 constexpr double kLeastPlaces = 3 * kFolds;  // so that each fold has some to be predicted
 constexpr double kThrottleTried = 0.2;       // of the tried ratios: 5 % of the weight, a carpet
 constexpr std::size_t kClimbed = 4;          // of the groups, each from its best
@@ -97,7 +96,7 @@ struct Circle {
         ratio(values[row_index(rows, "patch_ratio")]) {}
   // One that is larger than the log reaches is an edge.
   bool may_be(const std::vector<Vector2d>& places) const {
-    return ratio > 0 && radius < kLargest * scatter_of(places);
+    return ratio > 0 && radius < kLargestPatch * scatter_of(places);
   }
   bool has(const Vector2d& place) const { return (place - middle).norm() < radius; }
 };

@@ -14,7 +14,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kMostAliases = 3;
 constexpr double kAlmostSure = 0.99;  // no log makes surer than this
 
 class GroundReport {

@@ -12,6 +12,7 @@
 #include "common/base/text.h"
 #include "common/math/laws.h"
 #include "master/ground/tolerances.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -346,7 +347,7 @@ std::string values_that_would_move(const GroundSearch& search) {
   for (std::size_t k = 0; k < search.fit.rows.size(); ++k) {
     const FitRow& row = search.fit.rows[k];
     const double by = search.free_fit.values[k] - row.row.nominal;
-    if (row.free || std::abs(by) < kMovedTolerances * row.row.tolerance) continue;
+    if (row.free || std::abs(by) < kSureGain * row.row.tolerance) continue;
     moved.emplace_back(-std::abs(by) / row.row.tolerance, value_move(row, by));
   }
   std::sort(moved.begin(), moved.end());

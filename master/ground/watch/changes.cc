@@ -13,6 +13,7 @@
 #include "master/ground/watch/fleet_steps.h"
 #include "master/ground/watch/mixed_model.h"
 #include "master/infer/certificate.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -22,7 +23,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kWarmRounds = 4;       // from values nearby
-constexpr int kNullDraws = 400;      // of each kind
 constexpr double kOddWeight = 0.25;  // of a run that is off by itself
 
 ScaledFleet scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots,
@@ -138,7 +138,7 @@ WatchThresholds draw_thresholds(const ScaledFleet& fleet, const RunVariances& va
   std::vector<std::vector<double>> steps(fleet.directions.size());
   std::vector<double> robots;
   const bool compared = fleet.robots.size() > 2;
-  for (int d = 0; d < kNullDraws; ++d) {
+  for (int d = 0; d < kDraws; ++d) {
     Stream stream({seed, Purpose::kStatistics, in_order ? 5U : 6U, static_cast<std::uint64_t>(d)});
     ScaledFleet drawn = null.draw(&stream, in_order);
     RunVariances at = variances;
@@ -204,7 +204,7 @@ std::vector<std::vector<double>> detectable_of(const ScaledFleet& fleet, RobotRu
   std::vector<std::vector<double>> detectable;
   for (const auto& scores : score_steps(fit_robot(robot, variances), robot, fleet.directions)) {
     const double squares =
-        infer::noncentrality_for(infer::kDetectablePower, thresholds.steps[detectable.size()], 1);
+        infer::noncentrality_for(kDetectablePower, thresholds.steps[detectable.size()], 1);
     detectable.push_back(mapped(
         scores, [&](const StepScore& score) { return std::sqrt(squares / score.precision); }));
   }

@@ -7,6 +7,7 @@
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
 #include "master/ground/watch/fleet_steps.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -60,7 +61,8 @@ StepCandidate with_best_length(const ScaledFleet& fleet, const RunVariances& var
   const RobotRuns& robot = fleet.robots[step.robots.front()];
   const RobotFit fit = fit_robot(robot, variances);
   double best = 0;
-  for (std::size_t length = kLeastRuns; step.length > 0 && length < robot.values.size(); ++length) {
+  for (std::size_t length = kFewestAlike; step.length > 0 && length < robot.values.size();
+       ++length) {
     const auto scores = score_steps(fit, robot, {fleet.directions[step.value]}, length);
     for (const StepScore& s : scores.front()) {
       if (s.statistic() <= best) continue;

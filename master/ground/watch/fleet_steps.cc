@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "master/infer/settings.h"
+
 namespace gapfarm {
 namespace {
 
@@ -11,8 +13,8 @@ constexpr double kLonger = 1.5;  // times as many runs, of the lengths that are 
 // 0, and as many runs as a step may last.
 std::vector<std::size_t> lengths_of(std::size_t runs) {
   std::vector<std::size_t> lengths = {0};
-  for (auto length = static_cast<double>(kLeastRuns);
-       length + 2.0 * kLeastRuns <= static_cast<double>(runs); length *= kLonger) {
+  for (auto length = static_cast<double>(kFewestAlike);
+       length + 2.0 * kFewestAlike <= static_cast<double>(runs); length *= kLonger) {
     lengths.push_back(static_cast<std::size_t>(length));
   }
   return lengths;

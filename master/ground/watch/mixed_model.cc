@@ -6,6 +6,7 @@
 
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -33,7 +34,7 @@ MatrixXd variance_of(const MatrixXd& covariance, const RunVariances& variances) 
 bool lies_near_step(const RobotRuns& robot, const VectorXd& direction, std::size_t run) {
   return std::ranges::any_of(robot.steps, [&](const StepColumn& step) {
     return step.direction == direction &&
-           std::max(run, step.onset) < std::min(run, step.onset) + kLeastRuns;
+           std::max(run, step.onset) < std::min(run, step.onset) + kFewestAlike;
   });
 }
 
@@ -111,7 +112,7 @@ std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const Robot
   for (std::size_t i = n; i-- > 0;) {
     count(i, 1);
     if (length > 0 && i + length < n) count(i + length, -1);
-    if (n - i < kLeastRuns + length || i < kLeastRuns) continue;
+    if (n - i < kFewestAlike + length || i < kFewestAlike) continue;
     for (std::size_t k = 0; k < directions.size(); ++k) {
       const VectorXd& d = directions[k];
       if (lies_near_step(robot, d, i) || (length > 0 && lies_near_step(robot, d, i + length)))

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "master/infer/settings.h"
+
 namespace gapfarm {
 
 // A column of a robot's design: from run `onset` on its values are moved along the direction.
@@ -50,7 +52,7 @@ struct StepScore {
   double precision = 0;  // of the change
   double statistic() const { return change * change * precision; }
 };
-// [direction][onset]; nothing (precision 0) where fewer than kLeastRuns runs lie on a side, or
+// [direction][onset]; nothing (precision 0) where fewer than kFewestAlike runs lie on a side, or
 // between it and another of the robot's steps in this direction.
 std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const RobotRuns& robot,
                                                 const std::vector<Eigen::VectorXd>& directions,
@@ -65,8 +67,6 @@ struct Shared {
 // `skipped`: a robot that is not among them; -1: all are.  `prior`: variances of robots of a kind.
 Shared estimate_shared(const std::vector<RobotFit>& fits, const Eigen::VectorXd& prior,
                        int skipped);
-
-inline constexpr std::size_t kLeastRuns = 3;
 
 // What a share `alarms` of such maxima exceed, by the exponential tail of the highest tenth where
 // it is less than that.

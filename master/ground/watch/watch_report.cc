@@ -10,6 +10,7 @@
 #include "common/json/fields.h"
 #include "common/math/laws.h"
 #include "master/ground/watch/mixed_model.h"
+#include "master/infer/settings.h"
 #include "master/report/figures/figures.h"
 #include "master/report/page_frame.h"
 
@@ -78,7 +79,7 @@ std::string verdict(const WatchedFleet& fleet, const FleetChanges& changes) {
   const std::string first = first_to_look_at(fleet, changes);
   const bool changed = !changes.steps.empty() || !changes.odd_robots.empty();
   const bool shown = std::ranges::any_of(
-      fleet.robots, [](const auto& robot) { return robot.runs.size() >= 2 * kLeastRuns; });
+      fleet.robots, [](const auto& robot) { return robot.runs.size() >= 2 * kFewestAlike; });
   return std::string(changed ? "Something changed."
                      : shown ? "Nothing changed that these runs show."
                              : "Too few runs: a change has three of them before it and three "

@@ -74,18 +74,17 @@ TEST(Regression, AColumnIsHeldToItsSize) {
 }
 
 TEST(Verdict, FollowsWhatIsNamedAndWhatIsLeft) {
-  constexpr double kLeast = -4.2;
   const std::vector<Leftover> clean = {{"start heading", -2, 3}};
   const std::vector<Leftover> little = {{"start heading", -6, 5}};
   const std::vector<Leftover> much = {{"start heading", -40, 90}};
-  EXPECT_EQ(judge_verdict(false, 0, clean, kLeast), Verdict::kNone);
-  EXPECT_EQ(judge_verdict(false, 0, little, kLeast), Verdict::kUnknown);
-  EXPECT_EQ(judge_verdict(true, 100, clean, kLeast), Verdict::kEffect);
-  EXPECT_EQ(judge_verdict(true, 100, little, kLeast), Verdict::kEffectAndUnknown);
-  EXPECT_EQ(judge_verdict(true, 100, much, kLeast), Verdict::kUnknown);
+  EXPECT_EQ(judge_verdict(false, 0, clean), Verdict::kNone);
+  EXPECT_EQ(judge_verdict(false, 0, little), Verdict::kUnknown);
+  EXPECT_EQ(judge_verdict(true, 100, clean), Verdict::kEffect);
+  EXPECT_EQ(judge_verdict(true, 100, little), Verdict::kEffectAndUnknown);
+  EXPECT_EQ(judge_verdict(true, 100, much), Verdict::kUnknown);
   const std::vector<Leftover> twelfth = {{"place", -10, 12}};
-  EXPECT_EQ(judge_verdict(true, 100, twelfth, kLeast), Verdict::kEffectAndUnknown);
-  EXPECT_EQ(judge_verdict(true, 100, twelfth, kLeast, kWrongShareOfTwo), Verdict::kUnknown);
+  EXPECT_EQ(judge_verdict(true, 100, twelfth), Verdict::kEffectAndUnknown);
+  EXPECT_EQ(judge_verdict(true, 100, twelfth, kWrongShareOfTwo), Verdict::kUnknown);
 }
 
 }  // namespace

@@ -83,11 +83,11 @@ TEST(Unsettled, ForeseenTheyScoreBetterAndOtherTrialsTheSame) {
 }
 
 TEST(Report, WhatIsLeftIsOneCautionTheClearestFirst) {
-  EXPECT_THAT(steps::leftover_caution({{"the time", -2, 0}}, -4), ::testing::IsEmpty());
-  EXPECT_THAT(steps::leftover_caution({{"the time", -5, 0}}, -4),
+  EXPECT_THAT(steps::leftover_caution({{"the time", -2, 0}}), ::testing::IsEmpty());
+  EXPECT_THAT(steps::leftover_caution({{"the time", -5, 0}}),
               ::testing::ElementsAre("What is left still depends on the time."));
   EXPECT_THAT(
-      steps::leftover_caution({{"the time", -5, 0}, {"x", -3, 0}, {"y", -9, 0}}, -4),
+      steps::leftover_caution({{"the time", -5, 0}, {"x", -3, 0}, {"y", -9, 0}}),
       ::testing::ElementsAre("What is left still depends on y and the time (the clearest first)."));
 }
 
