@@ -223,15 +223,21 @@ void put_value(const std::string& name, double value, Problem* problem) {
   problem->values[*row] = std::clamp(value, p.lower, p.upper);
 }
 
-// Fits the program's own parameters, everything else as it is.
-Status tune_program(Farm& farm, const RunLog& log, const WindowSettings& settings,
+// Fits the program's own parameters, everything else as it is, to the log with what is the wrong
+// way round or in another unit put right: they would take it up.
+Status tune_program(Farm& farm, const RunLog& log, const GroundDiagnoseOptions& options,
                     std::vector<KinematicRow>* rows, Problem* problem) {
   ProgramFarm program(farm, *problem);
-  GroundQuestion question;
-  question.simulation = [&](const WindowSet& windows) { return program.simulation(windows); };
   const GroundRobot robot = robot_of(*problem, program.X_RM());
-  ASSIGN_OR_RETURN(const auto windows, question.windows(robot, log, settings));
-  const WindowFit fit = WindowFitter(robot, windows).fit(held_rows(*rows));
+  GroundQuestion question = question_of_program(*problem, robot, *rows, log);
+  question.simulation = [&](const WindowSet& windows) { return program.simulation(windows); };
+  GroundSearch sound;
+  static_cast<GroundBasis&>(sound) = question;
+  sound.log = log;
+  GroundWork work = options;
+  work.memo = nullptr;
+  RETURN_IF_ERROR(search_faults(robot, question, work, &sound));
+  const WindowFit fit = WindowFitter(robot, sound.windows).fit(held_rows(*rows));
   RETURN_IF_ERROR(program.failure());
   for (std::size_t k = 0; k < rows->size(); ++k) {
     KinematicRow& row = (*rows)[k];
@@ -261,7 +267,7 @@ Result<GroundDiagnosis> diagnose_program_runs(Farm& farm, const std::vector<Gene
     std::vector<KinematicRow> rows = tuned_rows(*problem, tuned);
     if (!rows.empty()) {
       if (options.on_stage) options.on_stage(kGroundStages[0].name);
-      RETURN_IF_ERROR(tune_program(farm, log, options.windows, &rows, problem));
+      RETURN_IF_ERROR(tune_program(farm, log, options, &rows, problem));
     }
     ProgramFarm program(farm, *problem);
     const GroundRobot robot = robot_of(*problem, program.X_RM());

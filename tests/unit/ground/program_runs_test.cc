@@ -164,6 +164,21 @@ TEST(ProgramRuns, WhatAParameterOfTheProgramsDoesNoGainMayClaim) {
   EXPECT_NEAR(problem.values[problem.table().row("speed")], 1.25 * kSpeed, 0.01);
 }
 
+// A speed that is fitted first to v in km/h would take most of that up.
+TEST(ProgramRuns, ParametersAreTunedToTheLogPutRight) {
+  Problem problem = problem_of("[genes]\nspeed = [0.9, 1.5]\n");
+  const std::vector<Gene> tuned = std::move(problem.genes);
+  problem.genes.clear();
+  ProgramOfRuns farm;
+  const auto found = diagnose_program_runs(farm, tuned, driven({0, 1 / 3.6, 1}), {}, &problem);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  const Diagnosis& d = found->diagnosis;
+  EXPECT_TRUE(named(d, "unit_error")) << d.headline;
+  EXPECT_EQ(d.effects.size(), 1u) << d.headline;
+  EXPECT_NEAR(problem.values[problem.table().row("speed")], kSpeed, 0.01);
+  EXPECT_LT(d.position_mm.final_, 2 * d.position_mm.floor);
+}
+
 TEST(ProgramRuns, ExchangedChannelsAreAFaultOfTheLog) {
   RunLog log = driven({});
   for (LoggedRun& run : log.runs) {
