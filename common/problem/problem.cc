@@ -165,9 +165,7 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
   return all;
 }
 
-Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
-                         Problem* problem) {
-  ASSIGN_OR_RETURN(const auto all, read_run_folders(folders, problem->channels()));
+Status set_runs(const RunLog& all, const WindowSettings& windows, Problem* problem) {
   ASSIGN_OR_RETURN(auto cut, cut_windows(all, windows));
   if (problem->ground) {
     const GroundRobot& robot = problem->ground->robot();

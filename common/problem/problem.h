@@ -192,10 +192,9 @@ std::vector<std::string> command_names(const std::vector<CommandSpec>& commands)
 Result<RunLog> read_run_folders(std::span<const std::string> folders,
                                 std::span<const std::string> channels);
 
-// Reads commands.csv and poses.csv of each folder, cuts them into windows and makes those the
-// problem's trials, checked as from_proto() does.  REQUIRES: a problem with a robot.
-Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
-                         Problem* problem);
+// Cuts the runs into windows and makes those the problem's trials, checked as from_proto() does.
+// REQUIRES: a problem with a robot.
+Status set_runs(const RunLog& all, const WindowSettings& windows, Problem* problem);
 
 // What a task asks, whoever asks it and when: evaluation is pure, so equal questions have equal
 // answers.

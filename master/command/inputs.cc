@@ -51,7 +51,7 @@ Status read_log_of(const TrialOptions& trials, Config* config) {
                       : ": names no trial files; add them to the config or give --trials FILE")};
   }
   if (problem.windows()) {
-    return read_problem_runs(config->trial_files, config->windows, &problem);
+    return read_useful_runs(config->trial_files, config->windows, &problem);
   }
   ASSIGN_OR_RETURN(problem.log, read_trial_files(config->trial_files,
                                                  command_names(problem.commands), trials.read));

@@ -204,6 +204,29 @@ std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunL
   return findings;
 }
 
+Status read_useful_runs(std::span<const std::string> folders, const WindowSettings& windows,
+                        Problem* problem) {
+  ASSIGN_OR_RETURN(auto log, read_run_folders(folders, problem->channels()));
+  if (!problem->ground) return set_runs(log, windows, problem);
+  const GroundRobot robot = problem->ground->robot_at(problem->values);
+  const RunChecks checks = check_runs(log, robot.motors.command_timeout_s);
+  if (checks.none_is_left(log)) return set_runs(log, windows, problem);
+  if (!checks.useless.empty()) {
+    log.notes.push_back(
+        "omitted runs, which gapfarm check explains: " +
+        joined(checks.useless, ", ", [&](std::size_t r) { return log.runs[r].run; }));
+  }
+  log = without(std::move(log), checks);
+  // Headings in degrees jump wherever the robot turns.
+  const RunChecks jumps = check_jumps(log);
+  if (!jumps.false_poses.empty() && wrong_way_round(robot, log).empty()) {
+    log.notes.push_back(
+        fmt::format("omitted {} poses, which gapfarm check explains", jumps.false_poses.size()));
+    log = without(std::move(log), jumps);
+  }
+  return set_runs(log, windows, problem);
+}
+
 void emit_faults(const GroundWork& work, const GroundSearch& search) {
   if (!work.on_finding) return;
   Finding finding;

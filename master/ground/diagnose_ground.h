@@ -57,6 +57,11 @@ GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& sear
 // What a log has the wrong way round or in another unit, in seconds, nothing fitted.
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log);
 
+// Reads each folder's runs and makes them the problem's, but for those of a ground robot's that
+// show nothing and for poses of a lost tracker; what was omitted is in the log's notes.
+Status read_useful_runs(std::span<const std::string> folders, const WindowSettings& windows,
+                        Problem* problem);
+
 void emit_faults(const GroundWork& work, const GroundSearch& search);
 // Of the step in work, as far as it has come.
 void emit_offers(const GroundWork& work, const GroundSearch& search,

@@ -10,6 +10,7 @@
 #include "common/trials/read.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/optimisers.h"
+#include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/simulated_start.h"
 #include "master/run/baseline_notes.h"
 #include "master/run/run_page.h"
@@ -190,7 +191,7 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
   }
   Problem apart = config.problem;
   if (apart.windows()) {
-    RETURN_IF_ERROR(read_problem_runs(plan.validation_files, config.windows, &apart));
+    RETURN_IF_ERROR(read_useful_runs(plan.validation_files, config.windows, &apart));
     return std::optional<Problem>(std::move(apart));
   }
   ASSIGN_OR_RETURN(apart.log,

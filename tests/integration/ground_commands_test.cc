@@ -135,6 +135,19 @@ TEST_F(GroundCommands, CheckFindsTimesInMilliseconds) {
                     HasSubstr("Write times in s"), Not(HasSubstr("failed"))));
 }
 
+// Fifteen of sixty windows were a tracker's that stood still, and evolve fitted them.
+TEST_F(GroundCommands, EvolveOmitsWhatCheckCallsOmitted) {
+  write_runs("still", {0.2, 0, 0.2});
+  const Finished planned =
+      gapfarm_command({"evolve", config("[genes]\ndelay = \"table\"\n"), "--trials",
+                       folder_ / "still", "--out", folder_ / "run", "--dry-run", "--json"});
+  EXPECT_THAT(planned.err, HasSubstr("omitted runs, which gapfarm check explains: 2, 3"));
+  const Finished checked =
+      gapfarm_command({"check", config(""), "--trials", folder_ / "still", "--json"});
+  EXPECT_EQ(json::parse(checked.out).at("trials"), json::parse(planned.out).at("trials"))
+      << checked.out << planned.out;
+}
+
 TEST_F(GroundCommands, EvolveWarnsOfTimesInMilliseconds) {
   write_runs("slow", {0.2}, 1e3);
   const auto planned = [&](const std::string& log) {
