@@ -153,18 +153,24 @@ double RobotDrive::angle_of(double command) const {
   return angle;
 }
 
-void RobotDrive::steer(double wanted_rad, double dt_s) {
+double RobotDrive::steer(double wanted_rad, double dt_s) {
   const double before = steering_rad_;
   const double lag = robot_.motors.lag_s;
-  if (fresh_ || lag <= 0) {
-    steering_rad_ = wanted_rad;
-  } else {
-    steering_rad_ = wanted_rad + (before - wanted_rad) * std::exp(-dt_s / lag);
+  steering_rad_ = wanted_rad;
+  if (fresh_) return wanted_rad;
+  double mean = wanted_rad;
+  if (lag > 0) {
+    const double gap = before - wanted_rad, decay = std::exp(-dt_s / lag);
+    steering_rad_ += gap * decay;
+    mean += gap * (1 - decay) * lag / dt_s;
   }
-  if (robot_.steering.rate_limit_rad_s && !fresh_) {
+  if (robot_.steering.rate_limit_rad_s) {
     const double most = *robot_.steering.rate_limit_rad_s * dt_s;
-    steering_rad_ = std::clamp(steering_rad_, before - most, before + most);
+    const double limited = std::clamp(steering_rad_, before - most, before + most);
+    if (limited != steering_rad_) mean = (before + limited) / 2;
+    steering_rad_ = limited;
   }
+  return mean;
 }
 
 double RobotDrive::throttle(double commanded, double dt_s, double yaw_rate_rad_s,
@@ -250,13 +256,13 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
       speed = follow(0, dead(at(commanded, speed_)) * radius, dt_s);
       steered_traction = driven != nullptr && driven->steered;
     }
-    steer(wanted, dt_s);
+    const double steered_rad = steer(wanted, dt_s);
     // The middle of the unsteered axle is slower than a steered traction wheel.
-    if (steered_traction) speed *= std::cos(steering_rad_);
+    if (steered_traction) speed *= std::cos(steered_rad);
     const double slow = 1 + robot_.steering.understeer_s2_m2 * speed * speed;
-    if (steering_rad_ != tangent_of_rad_) {
-      tangent_of_rad_ = steering_rad_;
-      tangent_ = std::tan(steering_rad_);
+    if (steered_rad != tangent_of_rad_) {
+      tangent_of_rad_ = steered_rad;
+      tangent_ = std::tan(steered_rad);
     }
     curvature_ = tangent_ / *robot_.controller.wheelbase_m / slow;
     traction_m_s_ = speed;

@@ -77,7 +77,7 @@ class RobotDrive {
  private:
   void wheel_targets(const std::vector<double>& commanded);
   void twist_targets(double v, double omega, double vy);
-  void steer(double wanted_rad, double dt_s);
+  double steer(double wanted_rad, double dt_s);  // the mean angle of the step, rad
   double throttle(double commanded, double dt_s, double yaw_rate_rad_s, const FloorForces& floor);
   void place_on_curve();
   double follow(std::size_t wheel, double target_m_s, double dt_s);

@@ -73,7 +73,7 @@ TEST(WhatChanged, NamesADelayThatClosesTheGap) {
 TEST(WhatChanged, ReportsAnotherFloorFromOtherSteering) {
   const GroundRobot car = robot_of(kCar);
   const RunLog before = driven(car, cars_own(7));
-  const GroundDiagnosis floor = changed(car, before, driven(car, cars_own(7 * 0.6), 5));
+  const GroundDiagnosis floor = changed(car, before, driven(car, cars_own(7 * 0.6), 5, 1, {}, 20));
   ASSERT_EQ(floor.diagnosis.effects.size(), 1u) << floor.diagnosis.headline;
   const NamedEffect& friction = floor.diagnosis.effects.front();
   EXPECT_EQ(friction.name, "friction");
@@ -82,7 +82,8 @@ TEST(WhatChanged, ReportsAnotherFloorFromOtherSteering) {
   EXPECT_LT(friction.parameters[0].lo, -0.38);
   EXPECT_GT(friction.parameters[0].hi, -0.42);
   EXPECT_NE(floor.diagnosis.headline.find("fell by"), std::string::npos);
-  EXPECT_NE(floor.diagnosis.headline.find("nothing else"), std::string::npos);
+  EXPECT_NE(floor.diagnosis.headline.find("nothing else"), std::string::npos)
+      << floor.diagnosis.headline << floor.diagnosis.findings.front();
   EXPECT_NEAR(floor.corrected.friction, 7 * 0.6 / 9.81, 0.05);
   const GroundDiagnosis bent = changed(car, before, driven(car, cars_own(7, 0.05), 5));
   ASSERT_EQ(bent.diagnosis.effects.size(), 1u) << bent.diagnosis.headline;

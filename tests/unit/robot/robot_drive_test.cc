@@ -124,4 +124,31 @@ TEST(RobotDrive, AThrottleSettlesWhereItsForcesBalance) {
   EXPECT_NEAR(drive.curvature(), std::tan(0.21) / 0.17, 1e-9);
 }
 
+// Kinematics take steps of 0.05 s: angles at their ends made a fitted lag 23 ms too long.
+TEST(RobotDrive, HowFarACarTurnsIsTheSameWhateverTheStep) {
+  GroundRobot car;
+  car.drive = DriveKind::kAckermann;
+  car.command = CommandKind::kSpeedSteering;
+  car.channels = {"speed", "steering"};
+  car.controller.wheelbase_m = 0.3;
+  car.controller.wheel_radius_m = 0.05;
+  car.motors.lag_s = 0.1;
+  ASSERT_TRUE(complete_robot(&car).ok());
+  const std::vector<CommandRow> rows = {{0, {1, 0}}, {0.2, {1, 0.05}}};
+  const auto turned = [&](double dt_s) {
+    RobotDrive drive(car, rows);
+    double sum = 0;
+    const long steps = std::lround(1 / dt_s);
+    for (long k = 0; k < steps; ++k) {
+      (void)drive.advance(static_cast<double>(k) * dt_s, dt_s, 0);
+      sum += drive.curvature() * dt_s;
+    }
+    return sum;
+  };
+  // 0.7 s after the step, less the lag.
+  const double expected = std::tan(0.05) / 0.3 * (0.8 - 0.1 * (1 - std::exp(-8)));
+  EXPECT_NEAR(turned(0.05), expected, 1e-3 * expected);  // a tangent is no line
+  EXPECT_NEAR(turned(0.005), expected, 1e-3 * expected);
+}
+
 }  // namespace gapfarm::robot_drive_test
