@@ -330,7 +330,9 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   while (search.steps.size() < kMostNames && take_step(fitter, work, &search)) {
   }
   if (!(work.stopped && work.stopped())) drop_again(fitter, work, unnamed, &search);
+  const std::size_t stood = search.steps.size();
   if (!(work.stopped && work.stopped())) drop_stand_ins(fitter, work, unnamed, &search);
+  if (search.steps.size() != stood) drop_again(fitter, work, unnamed, &search);
   if (work.stopped && work.stopped()) return stopped;
   emit_steps(work, search);
   stage(kRestStage);

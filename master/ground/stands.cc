@@ -114,9 +114,11 @@ void drop_again(const WindowFitter& fitter, const GroundWork& work, const Ground
   const auto stands = [&](const GroundStep& step, const GroundNames& others) {
     const HeldOutGain gain =
         held_out_gain(search->windows, search->chain.back(), others.chain.back(), work.seed);
-    return others.steps.empty() ||
-           (may_be_named(gain) && may_be_named(step.held_out) &&
-            shows_its_size(fitter, work, *search, step.chosen, search->fit));
+    // What is left alone once another went may gain nothing that is sure.
+    return may_be_named(step.held_out) &&
+           (others.steps.empty() ||
+            (may_be_named(gain) &&
+             shows_its_size(fitter, work, *search, step.chosen, search->fit)));
   };
   drop_where_not(fitter, work, unnamed, search, stands);
 }
