@@ -108,7 +108,7 @@ Status find_idle_genes(const Config& config, unsigned workers, CliContext& conte
     return {};
   }
   FarmOptions options;
-  options.workers = workers;
+  options.workers = static_cast<int>(std::max(1u, workers));  // remote ones do not check
   ASSIGN_OR_RETURN(auto farm, start_farm(options, {}, context));
   ASSIGN_OR_RETURN(summary->idle, idle_genes(*farm, config));
   return {};
