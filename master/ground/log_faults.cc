@@ -15,6 +15,7 @@
 namespace gapfarm {
 namespace {
 
+constexpr int kOwnRounds = 10;  // of Gauss and Newton, for a run alone
 constexpr std::size_t kMostRuns = 9;
 constexpr int kClockSteps = 15;        // either way
 constexpr double kClockStep_s = 0.02;  // either way of the common delay
@@ -165,7 +166,36 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
   return {};
 }
 
-std::string far_runs(const GroundSearch& search) {
+namespace {
+
+// How much closer a run is to what its own values expect than to those of all runs: the ratio of
+// its residuals, where the nats are no chance; 1: no closer.
+double own_values_shrink(const WindowFitter& fitter, const GroundSearch& search, std::size_t run) {
+  const WindowSet& windows = fitter.windows();
+  std::vector<char> others(static_cast<std::size_t>(windows.blocks), 1);
+  double count = 0;
+  for (std::size_t i = 0; i < windows.run_of.size(); ++i) {
+    if (windows.run_of[i] != run) continue;
+    others[static_cast<std::size_t>(windows.block[i])] = 0;
+    count += 1;
+  }
+  std::vector<FitRow> rows = search.free_fit.rows;
+  // How a run's clock stands is a caution of its own.
+  for (FitRow& row : rows) {
+    if (row.row.name != "delay" && row.row.name != "lag") continue;
+    row.row.nominal = search.free_fit.values[row_index(rows, row.row.name)];
+    row.row.tolerance *= 1e-6;
+    row.free = false;
+  }
+  const WindowFit all = fitter.hold(rows, search.free_fit.values, others);
+  const WindowFit own = fitter.fit(rows, others, search.free_fit.values, kOwnRounds);
+  const double gain = own.objective - all.objective;
+  return gain < kFaultGain ? 1 : std::exp(gain * windows.lengths / (3 * count));
+}
+
+}  // namespace
+
+std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
   const WindowSet& windows = search.windows;
   const WindowFit& fit = search.fit;
   const std::vector<std::size_t>& run = windows.run_of;
@@ -182,9 +212,12 @@ std::string far_runs(const GroundSearch& search) {
     }
     if (misses[r].empty() || others.size() < 2) continue;
     const double times = median(misses[r]) / std::max(median(others), 1e-12);
-    if (!(times > kFarRun)) continue;
-    far.push_back(fmt::format("Run {} misses by {:.0f} times as much as the others.",
-                              search.log.runs[r].run, times));
+    const bool has_own = times > kFaultShrinks && !windows.simulated && !search.reference &&
+                         own_values_shrink(fitter, search, r) > kFaultShrinks;
+    if (!has_own && !(times > kFarRun)) continue;
+    far.push_back(fmt::format("Run {} misses by {:.1f} times as much as the others{}.",
+                              search.log.runs[r].run, times,
+                              has_own ? ", and other values fit it" : ""));
   }
   return joined(far, " ");
 }
@@ -218,6 +251,14 @@ double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {
     }
   }
   return std::isfinite(least) ? least : 0;
+}
+
+std::string unexplained_text(double share) {
+  return fmt::format(
+      "What is commanded does not explain how the robot moved: the best of what was tried leaves "
+      "{:.0f} % of what its motions differ by. Are these the commands and the poses of the same "
+      "runs, row by row, and do both columns mean what the robot's file says?",
+      100 * share);
 }
 
 std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search) {

@@ -303,6 +303,9 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   if (const GroundHypothesis* h = fault_of(robot, reference, settings, question, fitter, fit)) {
     return Error{"the log that values are fitted to is wrong in " + h->thing + ". " + h->remedy};
   }
+  if (const double left = share_unexplained(fitter, fit); left >= kUnexplained) {
+    return Error{unexplained_text(left)};
+  }
   std::vector<GroundHypothesis> traits = that_can_show(reference, ground_hypotheses(robot));
   if (alone) {
     std::erase_if(traits, [](const GroundHypothesis& h) {

@@ -160,14 +160,17 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
                                Eigen::VectorXd* values);
 
 // Of three runs or more those whose windows miss by far more than the others' (kFarRun), medians
-// of each: commands of another run, a world that is mirrored in this one alone.  "Run 3 misses by
-// 12 times as much as the others.", one sentence a run; empty: none.
-std::string far_runs(const GroundSearch& search);
+// of each, and those that values of their own fit as much better as a fault is worth: commands of
+// another run, a world that is mirrored in this one alone, a wheel that slips.  "Run 3 misses by
+// 12.0 times as much as the others.", one sentence a run; empty: none.
+std::string far_runs(const WindowFitter& fitter, const GroundSearch& search);
 
 // How much of what motions differ by a fit leaves, mean absolute values, of the component of the
 // ends that it explains best: near 1 where commands have nothing to do with how the robot moved.
 // 0: all commands or all motions are alike, so that nobody knows.
 double share_unexplained(const WindowFitter& fitter, const WindowFit& fit);
+// A sentence about such a share.
+std::string unexplained_text(double share);
 
 // The clocks of two to nine runs, where they are significantly apart: where each run has its own,
 // the windows are by so much better explained than by one for all.  More runs than these are drawn

@@ -214,7 +214,7 @@ void GroundReport::judge() {
   figures_.faults += static_cast<int>(search_.faults.size());
   figures_.closable = search_.closable;
   figures_.best_of_all = search_.best_of_all;
-  figures_.far_runs = far_runs(search_);
+  figures_.far_runs = far_runs(fitter_, search_);
   figures_.unexplained = search_.unexplained;
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
@@ -237,7 +237,8 @@ void GroundReport::judge() {
 }
 
 void GroundReport::clocks() {
-  const std::string runs = clocks_apart(fitter_, search_);
+  // A run that is off by itself looks as if its clock were.
+  const std::string runs = figures_.far_runs.empty() ? clocks_apart(fitter_, search_) : "";
   if (runs.empty()) return;
   d_.cautions.push_back("The runs' clocks are apart: from command to pose it takes " + runs +
                         ". Each log's commands and poses need one clock; how late they are on the "
@@ -375,7 +376,7 @@ Diagnosis GroundReport::write() {
   screening();
   trials();
   name_headline();
-  d_.action = what_to_do(search_, d_);
+  d_.action = what_to_do(robot_, search_, d_);
   return std::move(d_);
 }
 

@@ -244,13 +244,7 @@ std::string verdict_reason(const GroundFigures& figures) {
         closes, kToleratedGap);
   }
   if (figures.unexplained >= kUnexplained) {
-    return fmt::format(
-        "What is commanded does not explain how the robot moved: the best of what was tried leaves "
-        "{:.0f} % of "
-        "what its motions differ by. Are these the commands and the poses of the same runs, and do "
-        "both "
-        "columns mean what the robot's file says?",
-        100 * figures.unexplained);
+    return unexplained_text(figures.unexplained);
   }
   if (!figures.far_runs.empty()) {
     return figures.far_runs +
@@ -330,6 +324,8 @@ std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& sea
   std::vector<std::string> things;
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     const std::string& name = fit.rows[k].row.name;
+    const Eigen::Index named = row_index(search.fit.rows, name);
+    if (named >= 0 && search.fit.rows[static_cast<std::size_t>(named)].free) continue;
     // What lies before measured wheel speeds is a caution of its own.
     if (fitter.robot().measured && (name == "lag" || name == "delay")) continue;
     if (draws.row(k).norm() / root < kUnshown * prior_deviation(fit.rows[k])) continue;
@@ -370,7 +366,8 @@ std::string further_values(const GroundSearch& search, const std::vector<Reporte
                       : "robot.toml has what else these runs are sure of: " + joined(sure) + ".";
 }
 
-std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
+std::string what_to_do(const GroundRobot& robot, const GroundSearch& search,
+                       const Diagnosis& diagnosis) {
   if (!search.faults.empty()) return search.catalogue[search.faults[0].hypothesis].remedy;
   if (diagnosis.effects.empty()) {
     if (diagnosis.verdict == Verdict::kNone) {
@@ -381,8 +378,12 @@ std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
   }
   if (search.reference) return "Put right what changed, or fit the robot anew from then on.";
   if (search.windows.simulated) return "Give these values to the program.";
-  return "Take robot.toml beside this, which has these values, or gapfarm export ros for your "
-         "controller.";
+  // A log remembers the controller that drove it.
+  const bool driven = robot.command == CommandKind::kTwist;
+  return std::string(
+             "Take robot.toml beside this, which has these values, or gapfarm export ros for your "
+             "controller") +
+         (driven ? ", for logs to come: this one was driven by the controller of your file." : ".");
 }
 
 }  // namespace gapfarm

@@ -89,6 +89,7 @@ std::string values_that_would_move(const GroundSearch& search);
 std::string further_values(const GroundSearch& search, const std::vector<ReportedValue>& values);
 
 // The one thing to do about it, by the verdict and the effects of `diagnosis`; a sentence.
-std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis);
+std::string what_to_do(const GroundRobot& robot, const GroundSearch& search,
+                       const Diagnosis& diagnosis);
 
 }  // namespace gapfarm

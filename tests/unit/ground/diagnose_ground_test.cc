@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "common/base/ranges.h"
+#include "master/ground/reference.h"
 #include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {
@@ -242,6 +243,17 @@ TEST(DiagnoseGround, ARunThatIsTheOtherWayRoundAloneIsNamed) {
   }
 }
 
+// Of one run alone a wheel is a fifth smaller: the others hide it from every fit to all.
+TEST(DiagnoseGround, ARunWithValuesOfItsOwnIsNamed) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog log = driven(robot, {});
+  log.runs[2] = driven(robot, off_by({"left"}, {0.8})).runs[2];
+  const Diagnosis found = diagnosis_of(robot, log).diagnosis;
+  EXPECT_NE(found.verdict, Verdict::kNone) << found.headline;
+  EXPECT_NE(found.headline.find("Run 3 misses"), std::string::npos) << found.headline;
+  EXPECT_EQ(diagnosis_of(robot, driven(robot, {})).diagnosis.verdict, Verdict::kNone);
+}
+
 TEST(DiagnoseGround, CommandsOfOtherRunsExplainNothing) {
   const GroundRobot robot = robot_of(kDifferential);
   RunLog log = driven(robot, {});
@@ -253,6 +265,9 @@ TEST(DiagnoseGround, CommandsOfOtherRunsExplainNothing) {
   EXPECT_EQ(found.verdict, Verdict::kUnknown) << found.headline;
   EXPECT_TRUE(found.effects.empty()) << found.headline;
   EXPECT_NE(found.headline.find("does not explain how the robot moved"), std::string::npos);
+  const auto asked = ask_what_changed(robot, log, {{0.5, 2, 5}, 0.5}, 1, nullptr, /*alone=*/true);
+  ASSERT_FALSE(asked.ok()) << "values of a robot that does something else";
+  EXPECT_NE(asked.error().message.find("does not explain how the robot moved"), std::string::npos);
 }
 
 // Straight on nothing shows how far apart the sides are; a robot that stands shows nothing at all.
