@@ -80,19 +80,20 @@ namespace {
 // still follows within milliseconds.
 constexpr double kEvenly = 0.3;
 
-// By four-point Coulomb theory a skid-steer turns as wheels do that stand
-// 1 + (friction_ratio wheelbase / wheel_separation)^2 as far apart: the wheelbase of which that is
-// what was fitted, wherever the axles are.
-std::optional<double> rolling_wheelbase(const GroundRobot& robot, const Kinematics& fitted) {
-  const Eigen::Index at = fitted.index("separation");
-  if (robot.drive != DriveKind::kSkid || at < 0) return std::nullopt;
-  const double ratio = fitted.values[at];
-  double separation = 0;
-  for (const RobotWheel& w : robot.wheels) separation = std::max(separation, 2 * std::abs(*w.y_m));
-  const ControllerKinematics& k = robot.controller;
-  const double rolls =
-      ratio * k.wheel_separation_m.value_or(separation) * k.wheel_separation_multiplier;
-  return separation * std::sqrt(std::max(rolls / separation - 1, 1e-3)) / robot.friction_ratio;
+// A skid-steer whose wheelbase is searched turns as was fitted by that, wherever its axles are;
+// else by its friction across.
+GroundRobot searched_robot(const Problem& problem, const Kinematics& kinematics) {
+  const GroundRobot& given = problem.ground->robot();
+  GroundRobot robot = robot_with(given, kinematics);
+  const bool by_base = std::ranges::any_of(problem.genes, [&](const Gene& gene) {
+    return problem.table()[gene.row].key == "wheelbase";
+  });
+  if (robot.drive != DriveKind::kSkid || !by_base) return robot;
+  const double times = robot.friction_ratio / given.friction_ratio;
+  robot.friction_ratio = given.friction_ratio;
+  for (RobotWheel& w : robot.wheels) *w.x_m *= times;
+  if (robot.controller.wheelbase_m) *robot.controller.wheelbase_m *= times;
+  return robot;
 }
 
 // Wheels that say more than three motions can follow never agree quite.  Rigid ones leave it open
@@ -110,17 +111,12 @@ bool is_noise(const std::string& key) { return key.find("_noise_") != std::strin
 ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted) {
   ParameterValues values = problem.values;
   if (!fitted.values.allFinite()) return values;
-  const GroundRobot robot = robot_with(problem.ground->robot(), fitted);
+  const GroundRobot robot = searched_robot(problem, fitted);
   if (!check_robot(robot)) return values;
   const GroundTable there(robot), here(problem.ground->robot());
-  const auto wheelbase = rolling_wheelbase(problem.ground->robot(), fitted);
   for (const Gene& gene : problem.genes) {
     const Parameter& row = problem.table()[gene.row];
     const auto now = there.table().find(row.key), before = here.table().find(row.key);
-    if (row.key == "wheelbase" && wheelbase) {
-      values[gene.row] = std::clamp(*wheelbase, gene.lower, gene.upper);
-      continue;
-    }
     // Noise is in the robot's proportion.
     if (!now || !before || is_noise(row.key)) continue;
     const double wanted = there.table()[*now].nominal;
@@ -149,15 +145,14 @@ ParameterValues without_slip(const Problem& problem, ParameterValues values) {
 std::vector<bool> identified_by_kinematics(const Problem& problem) {
   Kinematics moved = nominal_kinematics(problem.ground->robot());
   for (double& value : moved.values) value += 1e-3 * (1 + std::abs(value));
-  const GroundTable there(robot_with(problem.ground->robot(), moved));
+  const GroundTable there(searched_robot(problem, moved));
   const GroundTable here(problem.ground->robot());
   std::vector<bool> identified;
   for (const Gene& gene : problem.genes) {
     const std::string& key = problem.table()[gene.row].key;
     const auto now = there.table().find(key), before = here.table().find(key);
-    const bool rolls = key == "wheelbase" && problem.ground->robot().drive == DriveKind::kSkid;
-    identified.push_back(rolls || (now && before && !is_noise(key) &&
-                                   there.table()[*now].nominal != here.table()[*before].nominal));
+    identified.push_back(now && before && !is_noise(key) &&
+                         there.table()[*now].nominal != here.table()[*before].nominal);
   }
   return identified;
 }

@@ -139,26 +139,35 @@ KinematicBody::KinematicBody(const GroundRobot& robot, const Kinematics& at)
   separation_ *= k.wheel_separation_m.value_or(1) * k.wheel_separation_multiplier;
 }
 
+std::optional<double> skid_friction_ratio(const GroundRobot& robot, double separation_ratio) {
+  double half = 0, front = 0, rear = 0;
+  for (const RobotWheel& w : robot.wheels) {
+    half = std::max(half, std::abs(*w.y_m));
+    front = std::max(front, *w.x_m);
+    rear = std::min(rear, *w.x_m);
+  }
+  if (robot.drive != DriveKind::kSkid || !(front > rear) || half == 0) return std::nullopt;
+  const ControllerKinematics& k = robot.controller;
+  const double rolls =
+      separation_ratio * k.wheel_separation_m.value_or(2 * half) * k.wheel_separation_multiplier;
+  return std::sqrt(std::max(rolls / (2 * half) - 1, 1e-3)) * 2 * half / (front - rear);
+}
+
 GroundRobot KinematicBody::corrected() const {
   GroundRobot robot = robot_;
-  if (grip_m_s2_) robot.friction = *grip_m_s2_ / kGravity_m_s2 / robot.friction_ratio;
   ControllerKinematics& k = robot.controller;
-  // By four-point Coulomb theory the multiplier is 1 + (ratio wheelbase / wheel_separation)^2.
-  const double multiplier = k.wheel_separation_multiplier * separation_ratio_;
-  double along = 1, across = 1;
+  double across = 1;
   if (!skids(robot)) {
     across = separation_ratio_;
     if (k.wheel_separation_m) *k.wheel_separation_m *= across;
-  } else {
-    if (multiplier > 1.01 && k.wheel_separation_multiplier > 1.01) {
-      along = std::sqrt((multiplier - 1) / (k.wheel_separation_multiplier - 1));
-    }
-    k.wheel_separation_multiplier = multiplier;
-    if (k.wheelbase_m) *k.wheelbase_m *= along;
+  } else if (separation_ratio_ != 1) {
+    robot.friction_ratio =
+        skid_friction_ratio(robot, separation_ratio_).value_or(robot.friction_ratio);
+    k.wheel_separation_multiplier *= separation_ratio_;
   }
+  if (grip_m_s2_) robot.friction = *grip_m_s2_ / kGravity_m_s2 / robot.friction_ratio;
   for (RobotWheel& w : robot.wheels) {
     if (w.kind == WheelKind::kCaster) continue;
-    *w.x_m *= along;
     *w.y_m *= across;
     const double side = w.side == WheelSide::kLeft    ? left_
                         : w.side == WheelSide::kRight ? right_

@@ -89,6 +89,12 @@ class OmniWheels {
   Eigen::VectorXd loads_;
 };
 
+// By four-point Coulomb theory a skid-steer turns as wheels do that stand
+// 1 + (friction_ratio wheelbase / wheel_separation)^2 as far apart as its own: the friction ratio
+// of which that is what its controller's separation and multiplier come to, times
+// `separation_ratio`. None of other drives and of wheels in one line.
+std::optional<double> skid_friction_ratio(const GroundRobot& robot, double separation_ratio);
+
 // The robot and the gains of its motion at some values.
 class KinematicBody {
  public:

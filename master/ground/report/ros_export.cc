@@ -11,6 +11,7 @@
 #include "common/json/fields.h"
 #include "common/robot/robot.h"
 #include "common/score/kinematic.h"
+#include "common/score/kinematic_body.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -107,7 +108,9 @@ std::vector<ReportedValue> robot_sizes(const ReportedValues& reported) {
     rows.push_back(product(reported, "wheels." + name + ".radius", *wheel->radius_m,
                            {"travel", name.c_str()}));
   }
-  if (const auto& separation = reported.given.controller.wheel_separation_m; separation) {
+  // A skid-steer's wheels stand where they stand: its multiplier is another.
+  const auto& separation = reported.given.controller.wheel_separation_m;
+  if (separation && !skids(reported.given)) {
     rows.push_back(product(reported, "wheel_separation", *separation, {"separation"}));
   }
   for (const auto& [key, name] : {std::pair{"marker.x", "marker_x"},
@@ -162,11 +165,8 @@ RosFriction ros_friction(const ReportedValues& reported) {
     return friction;
   }
   const ReportedValue* turn = find_by(reported.values, "separation", &ReportedValue::name);
-  const double own = robot.controller.wheel_separation_multiplier;
-  if (!skids(robot) || turn == nullptr || !turn->named || own < 1.01) return friction;
-  const auto ratio = [&](double times) {
-    return robot.friction_ratio * std::sqrt(std::max(0.0, own * times - 1) / (own - 1));
-  };
+  if (turn == nullptr || !turn->named || !skid_friction_ratio(robot, 1)) return friction;
+  const auto ratio = [&](double times) { return *skid_friction_ratio(robot, times); };
   friction.along = robot.friction;
   friction.across = robot.friction * ratio(turn->reported);
   friction.from = fmt::format(
@@ -209,8 +209,8 @@ std::string ros_yaml(const RosExport& data) {
     text += row.named
                 ? fmt::format("    {}: {:.6g}  # [{:.4g}, {:.4g}]; you had {:.6g}\n", row.name,
                               row.reported, row.interval.lower, row.interval.upper, row.had)
-                : fmt::format("    {}: {:.6g}  # as you have it: the log shows no other\n",
-                              row.name, row.had);
+                : fmt::format("    {}: {:.6g}  # as you have it: no other is named\n", row.name,
+                              row.had);
   }
   for (const std::string& remark : data.remarks) text += "    # " + remark + "\n";
   return text;

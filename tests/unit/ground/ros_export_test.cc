@@ -64,6 +64,29 @@ TEST(RosExport, TakesFrictionFromHowASkidSteerTurns) {
   EXPECT_NE(ros_table(data).find("1 1"), std::string::npos);
 }
 
+// Axles 0.28 m apart, wheels 0.4 m, a multiplier of 1.3 that is wrong: that of the runs is what the
+// axles and the friction across make, and the file's has no say.
+TEST(RosExport, TakesASkidSteersFrictionFromWhereItsWheelsStand) {
+  const ReportedValues reported = reported_of(
+      "drive = \"skid\"\ncommands = [\"v\", \"omega\"]\nwheel_separation = 0.4\nwheelbase = 0.28\n"
+      "wheel_radius = 0.1\nwheel_separation_multiplier = 1.3\n",
+      {{"separation", 1, 1.295, {1.28, 1.31}, true}});
+  const RosFriction friction = ros_friction(reported);
+  ASSERT_TRUE(friction.across.has_value());
+  const double ratio = std::sqrt(1.3 * 1.295 - 1) / (0.28 / 0.4);
+  EXPECT_NEAR(*friction.across, ratio * *friction.along, 1e-9);
+  Kinematics fitted = nominal_kinematics(reported.given);
+  fitted.values[fitted.index("separation")] = 1.295;
+  const GroundRobot corrected = robot_with(reported.given, fitted);
+  EXPECT_NEAR(corrected.friction_ratio, ratio, 1e-9);
+  EXPECT_NEAR(corrected.controller.wheel_separation_multiplier, 1.3 * 1.295, 1e-9);
+  for (std::size_t i = 0; i < corrected.wheels.size(); ++i) {
+    EXPECT_EQ(corrected.wheels[i].x_m, reported.given.wheels[i].x_m);
+  }
+  // Its wheels stand where they stand; the multiplier is among the controller's.
+  for (const ReportedValue& size : robot_sizes(reported)) EXPECT_NE(size.name, "wheel_separation");
+}
+
 TEST(RosExport, SpeaksOfCarsInTheirControllersText) {
   const ReportedValues reported =
       reported_of(kCar, {{"steering_gain", 1, 1.1, {1.08, 1.12}, true},
