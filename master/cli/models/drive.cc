@@ -72,8 +72,9 @@ Result<CommandSpec> command_of(const std::string& text, const std::vector<Comman
     if (colon != std::string::npos) {
       ASSIGN_OR_RETURN(const auto seconds,
                        numbers(text.substr(colon + 1), 1, "the duration of " + name));
-      if (!(seconds[0] > 0 && seconds[0] <= 60)) {
-        return Error{"command '" + text + "' lasts outside (0, 60] s"};
+      if (!(seconds[0] > 0 && seconds[0] <= kLongestCommand_s)) {
+        return Error{
+            fmt::format("command '{}' lasts outside (0, {:g}] s", text, kLongestCommand_s)};
       }
       command.duration_s = seconds[0];
     }

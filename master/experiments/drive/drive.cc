@@ -1,5 +1,7 @@
 #include "master/experiments/drive/drive.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -13,7 +15,6 @@ namespace {
 
 // Shorter commands are not worth giving, but every run gets each, so that legs correspond.
 constexpr double kShortest_s = 0.01;
-constexpr double kLongest_s = 10;
 constexpr double kPause_s = 1;  // between commands of a list
 
 Trial planned_leg(const CommandSpec& command, std::size_t index, double t_s, const Pose& X_WS,
@@ -39,23 +40,30 @@ void move_path(double dx_m, double dy_m, std::vector<PathSample>* path) {
   }
 }
 
-CommandSpec lasting(const ConstantVelocity& model, double seconds) {
+Result<CommandSpec> lasting(const ConstantVelocity& model, double seconds,
+                            const Eigen::Vector2d& target) {
+  if (seconds > kLongestCommand_s) {
+    return Error{fmt::format(
+        "way-point {:g},{:g} takes {:.0f} s of '{}', more than {:g} s; give way-points between",
+        target.x(), target.y(), seconds, model.command.name, kLongestCommand_s)};
+  }
   CommandSpec command = model.command;
-  command.duration_s = std::clamp(seconds, kShortest_s, kLongest_s);
+  command.duration_s = std::max(seconds, kShortest_s);
   return command;
 }
 
-CommandSpec turn_toward(const WaypointPilot& pilot, const Pose& X_WR,
-                        const Eigen::Vector2d& target) {
+Result<CommandSpec> turn_toward(const WaypointPilot& pilot, const Pose& X_WR,
+                                const Eigen::Vector2d& target) {
   const double bearing = std::atan2(target.y() - X_WR.y, target.x() - X_WR.x);
   const double error = wrap_angle(bearing - X_WR.theta);
   const ConstantVelocity& turn = error > 0 ? pilot.left : pilot.right;
-  return lasting(turn, error / turn.turn_rad_s);
+  return lasting(turn, error / turn.turn_rad_s, target);
 }
 
-CommandSpec go_to(const WaypointPilot& pilot, const Pose& X_WR, const Eigen::Vector2d& target) {
+Result<CommandSpec> go_to(const WaypointPilot& pilot, const Pose& X_WR,
+                          const Eigen::Vector2d& target) {
   const double distance = std::hypot(target.x() - X_WR.x, target.y() - X_WR.y);
-  return lasting(pilot.forward, distance / pilot.forward.speed_m_s);
+  return lasting(pilot.forward, distance / pilot.forward.speed_m_s, target);
 }
 
 // Appends one leg to every run; `choose` gives each its command.
@@ -63,7 +71,10 @@ template <class Choose>
 Status drive_leg(const Mover& mover, std::uint64_t leg, std::vector<Pose>& at,
                  std::vector<DrivenRun>& runs, const Choose& choose) {
   std::vector<MoverStart> starts;
-  for (std::size_t r = 0; r < runs.size(); ++r) starts.push_back({at[r], choose(at[r]), r, leg});
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    ASSIGN_OR_RETURN(const CommandSpec command, choose(at[r]));
+    starts.push_back({at[r], command, r, leg});
+  }
   ASSIGN_OR_RETURN(auto legs, mover(starts));
   for (std::size_t r = 0; r < runs.size(); ++r) {
     at[r] = legs[r].path.back().pose;
@@ -186,7 +197,7 @@ Result<std::vector<DrivenRun>> drive_commands(const Mover& mover, const Pose& X_
   std::vector<DrivenRun> driven(runs);
   std::vector<Pose> at(runs, X_WS);
   for (std::size_t c = 0; c < commands.size(); ++c) {
-    const auto given = [&](const Pose&) { return commands[c]; };
+    const auto given = [&](const Pose&) -> Result<CommandSpec> { return commands[c]; };
     RETURN_IF_ERROR(drive_leg(mover, c, at, driven, given));
   }
   return driven;

@@ -17,6 +17,8 @@
 
 namespace gapfarm {
 
+constexpr double kLongestCommand_s = 60;  // that a worker drives
+
 // One command of one run.
 struct Leg {
   CommandSpec command;
@@ -73,6 +75,7 @@ Result<WaypointPilot> make_pilot(std::span<const ConstantVelocity> models);
 
 // For each target in turn: turn toward it, then go as far as it is, by the pilot's rates.  Every
 // run looks where it stands before each command, as a robot under a camera does.
+// Errors: of the mover, a turn or a way that takes longer than kLongestCommand_s.
 Result<std::vector<DrivenRun>> drive_waypoints(const Mover& mover, const WaypointPilot& pilot,
                                                const Pose& X_WS,
                                                std::span<const Eigen::Vector2d> targets,

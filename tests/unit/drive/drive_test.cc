@@ -93,6 +93,12 @@ TEST_F(Drive, WaypointsAreReachedUnderACamera) {
   const Pose& end = exact->front().back().path.back().pose;
   EXPECT_NEAR(end.x, 0, 0.02);
   EXPECT_NEAR(end.y, 0.5, 0.02);
+  const auto far = drive_waypoints(steady, *pilot, {}, std::vector<Eigen::Vector2d>{{5, 0}}, 2);
+  ASSERT_TRUE(far.ok()) << far.error().message;
+  EXPECT_NEAR(far->front().back().path.back().pose.x, 5, 0.1);
+  const auto beyond =
+      drive_waypoints(steady, *pilot, {}, std::vector<Eigen::Vector2d>{{500, 0}}, 2);
+  EXPECT_THAT(beyond.error().message, HasSubstr("way-point 500,0 takes"));
 }
 
 TEST_F(Drive, TheMinedModelSpreadsAsItsLogDoes) {
