@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/hash.h"
+#include "common/problem/abilities.h"
 #include "common/score/motion_model.h"
 #include "worker/fitness.h"
 #include "worker/scenarios/scenario.h"
@@ -17,12 +18,11 @@ namespace {
 class Prepared : public PreparedProblem {
  public:
   Prepared(Problem problem, const Scenario& scenario)
-      : scenario_(scenario), problem_(std::move(problem)), model_(scenario.prepare(problem_)) {
+      : problem_(std::move(problem)), model_(scenario.prepare(problem_)) {
     if (!problem_.residual.empty()) facts_ = logged_motions(problem_);
   }
 
   const Problem& problem() const override { return problem_; }
-  const Scenario& scenario() const { return scenario_; }
   const ScenarioModel& model() const { return *model_; }
   // The model's, with the problem's correction.
   Prediction predict(const ParameterValues& values, const PredictOptions& options) const {
@@ -55,7 +55,6 @@ class Prepared : public PreparedProblem {
   void set_reference(FitnessReference reference) { reference_ = std::move(reference); }
 
  private:
-  const Scenario& scenario_;
   Problem problem_;
   std::unique_ptr<ScenarioModel> model_;
   std::vector<LoggedMotion> facts_;  // one a trial, where there is a correction
@@ -89,7 +88,7 @@ Result<ParameterValues> values_at(const Problem& problem, const v1::Point& point
 
 v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::EvaluateTask& task,
                    StepCounter* steps) {
-  if (p.scenario().can & kEvaluates) return p.model().evaluate(values, task, steps);
+  if (scenario_form(p.problem().scenario).objective) return p.model().evaluate(values, task, steps);
   PredictOptions options;
   options.stream = task.stream();
   options.steps = steps;
@@ -206,7 +205,8 @@ v1::TaskResult echo(const v1::EchoTask& task, StepCounter* steps) {
 template <class T>
 v1::TaskResult at_point(const Prepared& prepared, unsigned needed, const T& task,
                         StepCounter* steps) {
-  if ((prepared.scenario().can & needed) == 0) return invalid(prepared.scenario().lacks);
+  const Status can = check_can(prepared.problem().scenario, needed);
+  if (!can.ok()) return invalid(can.error().message);
   const auto values = values_at(prepared.problem(), task.point());
   if (!values) return invalid(values.error().message);
   return run(prepared, *values, task, steps);

@@ -9,6 +9,7 @@
 #include "common/config/sections.h"
 #include "common/config/toml_section.h"
 #include "common/external/simulator.h"
+#include "common/problem/abilities.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
@@ -180,11 +181,7 @@ Result<Config> read_config(const std::string& path) {
 }
 
 Status check_moves(const std::string& scenario, const std::string& path) {
-  if (!scenario_form(scenario).objective) return {};
-  return Error{path +
-               ": scenario objective has values and a number, and no trials or motions, which this "
-               "command is about; it can be checked, evolved, resumed, compared and replayed, and "
-               "shown by status, serve and report"};
+  return check_can(scenario, kPredicts | kSimulates | kTraces, path);
 }
 
 Status check_evolvable(const Config& config) {

@@ -9,6 +9,7 @@
 
 #include "common/base/build_info.h"
 #include "common/base/text.h"
+#include "common/problem/abilities.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
 #include "master/ground/diagnose_ground.h"
@@ -42,6 +43,7 @@ Status read_log_of(const TrialOptions& trials, Config* config) {
     if (trials.files.empty()) return {};
     return Error{config->path + ": scenario objective has no trials; omit --trials"};
   }
+  RETURN_IF_ERROR(check_can(problem.scenario, kPredicts, config->path));
   if (!trials.files.empty()) config->trial_files = trials.files;
   if (config->trial_files.empty()) {
     return Error{config->path +
@@ -60,9 +62,7 @@ Status read_log_of(const TrialOptions& trials, Config* config) {
 
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials) {
   ASSIGN_OR_RETURN(Config config, read_config(config_path));
-  if (trials.needed) {
-    RETURN_IF_ERROR(check_moves(config.problem.scenario, config_path));
-  }
+  if (trials.needed) RETURN_IF_ERROR(check_moves(config.problem.scenario, config_path));
   RETURN_IF_ERROR(read_log_of(trials, &config));
   if (config.problem.log.files.empty()) return config;
   const v1::Problem message = to_proto(config.problem);
@@ -327,7 +327,7 @@ Status check_no_residual(const Model& model, const std::string& path, const std:
 
 Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
   ASSIGN_OR_RETURN(Model model, find_model(run_or_model, console));
-  RETURN_IF_ERROR(check_moves(model.scenario, run_or_model));
+  RETURN_IF_ERROR(check_can(model.scenario, kPredicts, run_or_model));
   return model;
 }
 

@@ -132,7 +132,7 @@ int failed(const Error& error, CliContext& context);
 // A model file, or the model of a run's or a diagnosis's folder: its model.toml, or, where a run
 // has gone further than that says or left none, its best so far, of which a note shows.
 Result<Model> find_model(const std::string& run_or_model, Console& console);
-// The same; of a scenario in which something moves (check_moves()).
+// The same; of a scenario that predicts trials (check_can()).
 Result<Model> read_model_of(const std::string& run_or_model, Console& console);
 
 // What was fitted to, and at which values a simulation is driven.

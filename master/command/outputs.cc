@@ -13,6 +13,7 @@
 
 #include "common/base/text.h"
 #include "common/config/config.h"
+#include "common/problem/abilities.h"
 #include "common/trials/files.h"
 #include "master/store/records.h"
 
@@ -250,7 +251,7 @@ void TracedCommands::declare(CLI::App& app) {
 
 Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) const {
   ASSIGN_OR_RETURN(Config config, read_config(path));
-  RETURN_IF_ERROR(check_moves(config.problem.scenario, path));
+  RETURN_IF_ERROR(check_can(config.problem.scenario, kTraces, path));
   to->seed = config.seed;
   to->interval_s = interval_s;
   RETURN_IF_ERROR(choose(config.problem.commands, to));

@@ -73,6 +73,20 @@ TEST_F(GroundCommands, RunsKeepTheLettersOfTheirNames) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/ночь.csv"));
 }
 
+TEST_F(GroundCommands, WhatAScenarioCannotIsWrongUsage) {
+  const std::string court = GAPFARM_SOURCE_DIR "/configs/racquetball.toml", out = folder_ / "out";
+  const std::vector<std::vector<std::string>> wrong = {
+      {"evolve", court, "gapfarm influence"},
+      {"simulate", court, "gapfarm influence"},
+      {"influence", config(""), "gapfarm horizons"}};
+  for (const std::vector<std::string>& arguments : wrong) {
+    const Finished refused = gapfarm_command({arguments[0], arguments[1], "--out", out});
+    EXPECT_EQ(refused.exit_code, 2) << arguments[0];
+    EXPECT_THAT(refused.err, HasSubstr("use " + arguments[2])) << arguments[0];
+    EXPECT_FALSE(std::filesystem::exists(out) || std::filesystem::exists(out + ".partial"));
+  }
+}
+
 TEST_F(GroundCommands, ALogIsNoReferenceOfItself) {
   const std::string monday = folder_ / "monday";
   const Finished same = gapfarm_command({"diagnose", config(""), "--trials", monday, "--reference",

@@ -85,15 +85,11 @@ class ScenarioModel {
   }
 };
 
-enum ScenarioCan : unsigned { kPredicts = 1, kSimulates = 2, kTraces = 4, kEvaluates = 8 };
-
 struct Scenario {
   const char* name;
   const char* summary;
   // `problem` outlives the model.
   std::unique_ptr<ScenarioModel> (*prepare)(const Problem& problem);
-  unsigned can = kPredicts | kSimulates | kTraces;
-  const char* lacks = "";  // why it cannot the rest, and what can be done instead
 };
 
 std::span<const Scenario> scenarios();

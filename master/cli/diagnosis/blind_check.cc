@@ -9,6 +9,7 @@
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
 #include "common/config/config.h"
+#include "common/problem/abilities.h"
 #include "common/process/process_pool.h"
 #include "common/trials/read.h"
 #include "master/cli/subcommand.h"
@@ -46,7 +47,7 @@ Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config&
 Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan, Console& console) {
   Result<Config> config = read_config(options.config);
   if (!config) return config;
-  RETURN_IF_ERROR(check_moves(config->problem.scenario, options.config));
+  RETURN_IF_ERROR(check_can(config->problem.scenario, kSimulates, options.config));
   if (options.seed) config->seed = *options.seed;
   SimulateSettings& simulate = config->simulate;
   if (options.trials) {

@@ -6,6 +6,7 @@
 
 #include "common/base/text.h"
 #include "common/json/fields.h"
+#include "common/problem/abilities.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/trial.h"
 #include "common/trials/write.h"
@@ -171,6 +172,7 @@ Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& cont
     return run_plan_drive(options.drive, task, source.config, options.outputs, context);
   }
   RETURN_IF_ERROR(apply_options(options, source.config));
+  RETURN_IF_ERROR(check_can(source.config.problem.scenario, kSimulates, options.source));
   const bool pushes = !source.config.problem.pieces.empty();
   std::vector<std::string> outputs = trial_file_names(options.out, false, pushes);
   outputs.push_back(options.picture);

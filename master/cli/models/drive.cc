@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "common/base/text.h"
+#include "common/problem/abilities.h"
 #include "common/trials/read.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
@@ -259,6 +260,7 @@ Status plan_outputs(DriveCommand& command) {
 
 Result<int> run_drive(DriveCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto model, read_model_of(command.model, context.console));
+  RETURN_IF_ERROR(check_can(model.scenario, kSimulates, command.model));
   RETURN_IF_ERROR(check_no_residual(model, command.model, "drive"));
   ASSIGN_OR_RETURN(const Task task, read_task(command, model));
   RETURN_IF_ERROR(plan_outputs(command));

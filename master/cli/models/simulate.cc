@@ -4,6 +4,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/problem/abilities.h"
 #include "common/trials/read.h"
 #include "common/trials/trial.h"
 #include "common/trials/write.h"
@@ -106,6 +107,7 @@ Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, 
 
 Result<int> run_simulate(SimulateOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(Source source, read_source(options.source));
+  RETURN_IF_ERROR(check_can(source.config.problem.scenario, kSimulates, options.source));
   RETURN_IF_ERROR(apply_options(options, source.config));
   ASSIGN_OR_RETURN(const Plan plan, plan_and_outputs(options, source, context));
   if (context.dry_run) {
