@@ -88,6 +88,12 @@ TEST_F(Overwrite, TheRobotsFileOfAConfigIsAnInput) {
                        "5", "--want", "separation=0.01%", "--out", folder_ / "plan"});
   EXPECT_EQ(plan.exit_code, 0) << plan.err;
   EXPECT_THAT(plan.out, HasSubstr("separation stays wider than wanted: "));
+  const Finished unknown =
+      gapfarm_command({"plan", config, "--limit", "left=10", "--limit", "right=10", "--want",
+                       "separatio=2%", "--out", folder_ / "none"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err,
+              HasSubstr("no value \"separatio\", expected one of left, right, separation"));
 }
 
 TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {

@@ -39,11 +39,16 @@ std::optional<double> number_of(std::string text) {
   return value && std::isfinite(*value) ? std::optional(scale * *value) : std::nullopt;
 }
 
-Result<std::vector<plan::Wanted>> wanted_of(const std::vector<std::string>& texts) {
+Result<std::vector<plan::Wanted>> wanted_of(const std::vector<std::string>& texts,
+                                            const std::vector<KinematicRow>& rows) {
   std::vector<plan::Wanted> all;
   for (const std::string& text : texts) {
     const std::size_t equal = text.find('=');
     plan::Wanted wanted{text.substr(0, equal), 0};
+    if (!contains(rows, wanted.name, &KinematicRow::name)) {
+      return Error{"this robot has no value \"" + wanted.name + "\", expected one of " +
+                   joined(rows, ", ", &KinematicRow::name)};
+    }
     if (equal != std::string::npos) {
       const auto width = number_of(text.substr(equal + 1));
       if (!width || *width <= 0) {
@@ -272,7 +277,7 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
   settings.length_m = task.length_m;
   settings.width_m = task.width_m;
   settings.seed = task.seed;
-  ASSIGN_OR_RETURN(settings.wanted, wanted_of(options.wanted));
+  ASSIGN_OR_RETURN(settings.wanted, wanted_of(options.wanted, kinematic_rows(robot)));
   ASSIGN_OR_RETURN(settings.limits, limits_of(options.limits, robot.channels, recorded));
   RETURN_IF_ERROR(outputs.plan_in(task.out, {"commands.csv", "waypoints.csv"}));
   RETURN_IF_ERROR(outputs.plan({task.picture}));

@@ -117,8 +117,8 @@ struct DrivePlan {
 // their logarithms) and keep the marker on the floor, which it begins in the middle of, also where
 // it stops after them.  Where none does, or none that does more than stand, the robot is carried
 // back to the middle: another run.  Ends at rest, and as soon as all that is wanted is as narrow as
-// asked for.  Pure.  Errors: a wanted name that the robot does not have, a floor on which no move
-// has room.
+// asked for.  Pure.  Error: a floor on which no move has room.
+// REQUIRES: what is wanted is among kinematic_rows(robot).
 Result<DrivePlan> plan_drive(const GroundRobot& robot, const DriveNoise& noise,
                              const DriveSettings& settings);
 

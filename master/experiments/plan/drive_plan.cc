@@ -39,7 +39,7 @@ class Planner {
   }
 
   Result<DrivePlan> plan() {
-    RETURN_IF_ERROR(find_wanted());
+    find_wanted();
     DrivePlan plan;
     plan.rows = rows_;
     plan.widths.push_back({0, known_.widths()});
@@ -84,20 +84,14 @@ class Planner {
     run.poses.push_back({0, {}});
   }
 
-  Status find_wanted() {
+  void find_wanted() {
     wanted_ = settings_.wanted;
     if (wanted_.empty()) {
       wanted_ = mapped(rows_, [](const KinematicRow& row) { return Wanted{row.name, 0}; });
     }
     for (const Wanted& wanted : wanted_) {
-      const auto found = std::ranges::find(rows_, wanted.name, &KinematicRow::name);
-      if (found == rows_.end()) {
-        return Error{"this robot has no value \"" + wanted.name + "\", expected one of " +
-                     joined(rows_, ", ", &KinematicRow::name)};
-      }
-      index_.push_back(found - rows_.begin());
+      index_.push_back(std::ranges::find(rows_, wanted.name, &KinematicRow::name) - rows_.begin());
     }
-    return {};
   }
 
   bool enough() const {

@@ -157,10 +157,6 @@ TEST(DrivePlan, EndsWhenWhatIsWantedIsKnown) {
 TEST(DrivePlan, ReportsWhatCannotBe) {
   const GroundRobot robot = robot_of(kDifferential);
   DriveSettings settings = slow_wheels(10);
-  settings.wanted = {{"wheelbase", 0}};
-  EXPECT_THAT(plan::plan_drive(robot, kNoise, settings).error().message,
-              HasSubstr("no value \"wheelbase\", expected one of left, right, separation"));
-  settings.wanted.clear();
   settings.length_m = settings.width_m = 1e-6;
   EXPECT_THAT(plan::plan_drive(robot, kNoise, settings).error().message,
               HasSubstr("larger --place"));
