@@ -142,17 +142,22 @@ void parse_arguments(Program& program, std::vector<std::string> arguments) {
 int run_arguments(const std::vector<std::string>& arguments) {
   const std::unique_ptr<Program> program = make_program();
   Console console;
+  StopSource stop;
+  const StopOnSignals signals(&stop, StopOnSignals::kSecondEnds);
+  CliContext context{console, stop};
   try {
     parse_arguments(*program, arguments);
   } catch (const CLI::ParseError& error) {
     // What was not understood may be before the flag.
     if (contains(arguments, "--json")) console.use_json();
-    return console.end(answer_parse_error(*program->app, error, console));
+    const int exit_code = console.end(answer_parse_error(*program->app, error, console));
+    std::string ignored;
+    if (exit_code != kExitDone) {
+      conclude_command(innermost(*program->app, &ignored), exit_code, context);
+    }
+    return exit_code;
   }
   if (program->json) console.use_json();
-  StopSource stop;
-  const StopOnSignals signals(&stop, StopOnSignals::kSecondEnds);
-  CliContext context{console, stop};
   for (std::size_t i = 0; i < program->runs.size(); ++i) {
     const char* name = subcommands()[i].name;
     if (!program->app->got_subcommand(name)) continue;

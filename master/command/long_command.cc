@@ -332,7 +332,7 @@ bool is_dry_run(const CLI::App& command) {
 void conclude_command(const CLI::App& command, int exit_code, CliContext& context) {
   if (context.work != nullptr) context.work->end(exit_code);
   const std::string text = value_of(command, "--on-end");
-  if (text.empty() || context.dry_run) return;
+  if (text.empty() || is_dry_run(command)) return;
   const auto status =
       run_shell(text, {"GAPFARM_COMMAND=" + command.get_name(), "GAPFARM_OUT=" + out_of(command),
                        "GAPFARM_STATE=" + state_of_exit(exit_code),

@@ -274,6 +274,7 @@ TEST_F(LongCommands, RunsWhatTheUserWantsAtTheEnd) {
   const Finished failed = gapfarm_command(
       {"evolve", quick, "--out", folder_ / "run", "--generations", "1", "--on-end", hook});
   EXPECT_NE(failed.exit_code, 0);
+  EXPECT_EQ(gapfarm_command({"diagnose", "--on-end", hook, "--levl", quick}).exit_code, 2);
   RunningProgram master("gapfarm", {"resume", folder_ / "run", "--generations", "100000",
                                     "--workers", "1", "--on-end", hook});
   ASSERT_TRUE(wait_until([&] { return master.err().find("generation") != std::string::npos; }));
@@ -281,8 +282,8 @@ TEST_F(LongCommands, RunsWhatTheUserWantsAtTheEnd) {
   const int stopped = master.wait().exit_code;
   EXPECT_EQ(text_of(log_file), "evolve finished 0 " + folder_ / "run" + "\n" + "evolve failed " +
                                    std::to_string(failed.exit_code) + " " + folder_ / "run" + "\n" +
-                                   "resume stopped " + std::to_string(stopped) + " " +
-                                   folder_ / "run" + "\n");
+                                   "diagnose failed 2 \n" + "resume stopped " +
+                                   std::to_string(stopped) + " " + folder_ / "run" + "\n");
 }
 
 }  // namespace gapfarm::long_commands_test
