@@ -216,6 +216,10 @@ class Completion {
       if (!radius) return missing("robot_radius in m, or the wheels' x, y and heading");
       std::vector<std::string> names;
       for (const RobotWheel& w : r_.wheels) names.push_back(w.name);
+      if (names.empty() && r_.command == CommandKind::kTwist) {
+        names = {"wheel_1", "wheel_2", "wheel_3"};
+        assume("three wheels");
+      }
       if (names.empty()) names = r_.channels;
       if (names.size() < 3) return missing("three or more wheels, or as many channels");
       const double n = static_cast<double>(names.size());

@@ -103,6 +103,14 @@ TEST_F(GroundCommands, WatchNamesTheOneFolderOfARobotsFile) {
   EXPECT_THAT(watched.err, HasSubstr("put robot.toml into " + (folder_ / "fleet") + ", or name"));
 }
 
+TEST_F(GroundCommands, ARobotsFileDoesNotPassSuppositionsForFacts) {
+  const std::string out = folder_ / "whole.toml";
+  const Finished described = gapfarm_command({"robot", robot_, "--out", out});
+  EXPECT_EQ(described.exit_code, 0) << described.err;
+  EXPECT_THAT(described.out, HasSubstr("a mass of 10 kg"));
+  EXPECT_THAT(text_of(out), HasSubstr("\n# assumed: a mass of 10 kg\n"));
+}
+
 TEST_F(GroundCommands, TheMedianOfTwoEndsIsTheirMean) {
   const Finished exported =
       gapfarm_command({"export", "runs", config("[runs]\nfolders = [\"monday\"]\n"), "--out",

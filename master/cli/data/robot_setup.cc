@@ -26,7 +26,6 @@ Result<RobotReading> read_toml(const std::string& file) {
   ASSIGN_OR_RETURN(GroundRobot robot, read_robot(file));
   RobotReading reading;
   reading.robot = std::move(robot);
-  reading.robot.notes.clear();
   reading.sources.resize(reading.robot.wheels.size());
   reading.evidence.push_back(file + " says so");
   return reading;
@@ -118,6 +117,8 @@ Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
   for (const std::string& run : setup.runs)
     config_texts.runs.push_back(file_seen_from(setup.config, run));
   texts.robot = format_robot(texts.completed);
+  const auto assumed = [](const std::string& note) { return "# " + printable(note) + "\n"; };
+  texts.robot.insert(texts.robot.find('\n') + 1, joined(texts.completed.notes, "", assumed));
   texts.config = config_of_robot(texts.completed, config_texts);
   texts.reading = std::move(reading);
   return texts;

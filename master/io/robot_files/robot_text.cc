@@ -218,7 +218,7 @@ std::string describe_robot(const RobotReading& reading, const GroundRobot& compl
   if (!controller.empty()) text += "controller: " + controller + "\n";
   text += list("disagreements:", reading.disagreements);
   text += list("mind:", reading.remarks);
-  text += list("assumed:", completed.notes);
+  text += list("not stated:", completed.notes);
   return text;
 }
 

@@ -51,6 +51,17 @@ TEST(CompleteRobot, CrossesTheRollersOfAMecanumDrive) {
   EXPECT_EQ(robot.wheel("rear_left")->roller_angle_rad, std::numbers::pi / 4);
 }
 
+TEST(CompleteRobot, NamesNoWheelAfterATwist) {
+  GroundRobot robot;
+  robot.drive = DriveKind::kOmni;
+  robot.command = CommandKind::kTwist;
+  robot.channels = {"v", "omega", "vy"};
+  robot.controller.robot_radius_m = 0.2;
+  ASSERT_TRUE(complete_robot(&robot).ok());
+  EXPECT_NE(robot.wheel("wheel_3"), nullptr);
+  EXPECT_EQ(robot.wheel("omega"), nullptr);
+}
+
 TEST(CompleteRobot, NamesTheSizeThatIsMissing) {
   GroundRobot robot = sides(DriveKind::kDifferential);
   robot.controller.wheel_separation_m.reset();
