@@ -55,11 +55,11 @@ class Completion {
     if (!wheel.y_m) wheel.y_m = y_m;
   }
 
-  // Two wheels of which the file says no place stand for the sides of a robot.
+  // Wheels of these names of which the file says no place stand for the sides of a robot.
   bool states_sides() const {
-    const RobotWheel* left = r_.wheel("left");
-    const RobotWheel* right = r_.wheel("right");
-    return r_.wheels.empty() || (left != nullptr && right != nullptr && !left->x_m && !right->x_m);
+    return std::ranges::all_of(r_.wheels, [](const RobotWheel& w) {
+      return !w.driven || ((w.name == "left" || w.name == "right") && !w.x_m);
+    });
   }
 
   std::optional<double> separation() {

@@ -51,6 +51,20 @@ TEST(CompleteRobot, CrossesTheRollersOfAMecanumDrive) {
   EXPECT_EQ(robot.wheel("rear_left")->roller_angle_rad, std::numbers::pi / 4);
 }
 
+TEST(CompleteRobot, MakesTheSideThatAFileLeavesOut) {
+  GroundRobot robot = sides(DriveKind::kSkid);
+  robot.wheels.pop_back();
+  const Status status = complete_robot(&robot);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("\"front_right\" needs a radius"), std::string::npos)
+      << status.error().message;
+  robot = sides(DriveKind::kSkid);
+  robot.wheels.pop_back();
+  robot.controller.wheel_radius_m = 0.05;
+  ASSERT_TRUE(complete_robot(&robot).ok());
+  EXPECT_EQ(robot.wheels.size(), 4u);
+}
+
 TEST(CompleteRobot, NamesNoWheelAfterATwist) {
   GroundRobot robot;
   robot.drive = DriveKind::kOmni;
