@@ -286,6 +286,7 @@ class StageReader {
       stages.push_back(read_stage(*table, i + 1 == array->size()));
       for (const std::size_t gene : stages.back().genes) used[gene] = true;
     }
+    if (misread_) return;
     for (std::size_t gene = 0; gene < used.size(); ++gene) {
       if (!used[gene]) errors_.add(node, "gene " + names_[gene] + " is in no stage; add it to one");
     }
@@ -295,14 +296,18 @@ class StageReader {
   Stage read_stage(const toml::table& table, bool last) {
     TomlSection section(table, "[[stages]]", errors_);
     Stage stage;
-    if (const auto genes = section.choices("genes", names_)) {
+    const auto genes = section.choices("genes", names_);
+    if (genes) {
       stage.genes = *genes;
       std::sort(stage.genes.begin(), stage.genes.end());
       stage.genes.erase(std::unique(stage.genes.begin(), stage.genes.end()), stage.genes.end());
     }
     section.read("evaluations", stage.evaluations, 1);
     section.finish();
-    if (stage.genes.empty()) errors_.add(table, "a stage searches nothing; give it genes = [...]");
+    if (genes ? genes->empty() : section.find("genes") == nullptr) {
+      errors_.add(table, "a stage searches nothing; give it genes = [...]");
+    }
+    misread_ = misread_ || stage.genes.empty();
     if (!last && stage.evaluations == 0) {
       errors_.add(table, "a stage before the last has no end; give it evaluations = N");
     }
@@ -312,6 +317,7 @@ class StageReader {
   const Config& config_;
   TomlErrors& errors_;
   std::vector<std::string> names_;
+  bool misread_ = false;  // genes of a stage
 };
 
 }  // namespace

@@ -124,7 +124,8 @@ TEST(StagePlan, IsReadFromTheConfigsText) {
   EXPECT_TRUE(plan_of("")->stages.empty());
 
   EXPECT_THAT(plan_of("[[stages]]\ngenes = [\"fricton\", \"mass\"]\n").error().message,
-              HasSubstr("friction"));
+              testing::AllOf(HasSubstr("friction"), testing::Not(HasSubstr("stage"))));
+  EXPECT_THAT(plan_of("[[stages]]\ngenes = []\n").error().message, HasSubstr("searches nothing"));
   EXPECT_THAT(plan_of("[[stages]]\ngenes = [\"mass\"]\n").error().message,
               HasSubstr("friction is in no stage"));
   EXPECT_THAT(plan_of("[[stages]]\ngenes = [\"mass\"]\n[[stages]]\ngenes = [\"friction\"]\n")
