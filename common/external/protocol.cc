@@ -32,8 +32,7 @@ Result<unsigned> read_inputs(const Json& json) {
     const auto row = std::find_if(std::begin(kExternalInputNames), std::end(kExternalInputNames),
                                   [&](const ExternalInputWord& r) { return text == r.word; });
     if (row == std::end(kExternalInputNames)) {
-      return Error{"declares the unknown input '" + text + "'" + suggestion(text, known) +
-                   "; known: lag, dead_travel, floor, path"};
+      return Error{"declares the unknown input '" + text + "'" + suggestion(text, known)};
     }
     inputs |= row->input;
   }
@@ -47,8 +46,7 @@ Status check_keys(const Json& json, const std::string& parameter) {
   for (const auto& [key, value] : json.items()) {
     if (contains(kKeys, key)) continue;
     return Error{"declares parameter '" + parameter + "' with the unknown key '" + key + "'" +
-                 suggestion(key, kKeys) +
-                 "; known: key, unit, lower, upper, nominal, log, integer, choices, when, summary"};
+                 suggestion(key, kKeys)};
   }
   return {};
 }

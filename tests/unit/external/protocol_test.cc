@@ -51,7 +51,11 @@ TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
   EXPECT_THAT(error_of(declaration_with(
                   R"({"key": "m", "lower": 1, "upper": 2, "nominal": 1, "intger": true})")),
               HasSubstr("unknown key 'intger'; did you mean 'integer'?"));
-  EXPECT_THAT(error_of(declaration_with(kMass, R"(["paths"])")), HasSubstr("did you mean 'path'"));
+  EXPECT_THAT(error_of(declaration_with(R"({"key": "m", "foo": 1})")),
+              testing::EndsWith("'foo'; known: key, unit, lower, upper, nominal, log, integer, "
+                                "choices, when, summary"));
+  EXPECT_THAT(error_of(declaration_with(kMass, R"(["paths"])")),
+              testing::EndsWith("did you mean 'path'?"));
 }
 
 TEST(ExternalDeclaration, ReportsEverythingInOneLine) {
