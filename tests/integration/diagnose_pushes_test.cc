@@ -148,6 +148,9 @@ TEST_F(DiagnosePushes, PlansPushesWithTheFingersWays) {
       gapfarm_command({"plan", config, "--trials", "12", "--pool", "3", "--effects", "com_offset",
                        "--out", plan, "--workers", "1"});
   ASSERT_EQ(planned.exit_code, 0) << planned.err;
+  EXPECT_THAT(planned.out, testing::HasSubstr(folder_ / "plan/tips.csv" + " and " + plan +
+                                              ": 12 pushes to make, in this order"));
+  EXPECT_THAT(planned.out, testing::Not(testing::HasSubstr("chains")));
   const Finished driven = gapfarm_command({"simulate", config, "--like", plan, "--out",
                                            folder_ / "driven/pushes.csv", "--workers", "1"});
   EXPECT_EQ(driven.exit_code, 0) << driven.err;

@@ -97,7 +97,7 @@ std::string size_text(const plan::Visibility& seen) {
   return plain_number(*seen.size) + (seen.unit == "-" ? "" : " " + seen.unit);
 }
 
-std::string table_text(const plan::DesignedPlan& plan) {
+std::string table_text(const plan::DesignedPlan& plan, bool pushes) {
   std::string text = fmt::format("{:<32} {:>14} {:>14}  {}\n", "named 9 times in 10 from", "here",
                                  "random plan", "looks like");
   for (std::size_t k = 0; k < plan.seen.size(); ++k) {
@@ -112,19 +112,20 @@ std::string table_text(const plan::DesignedPlan& plan) {
                     *as_good, plan.power.back().trials);
   }
   text += fmt::format(
-      "No choice of as many such chains, repeats included, shows effects from sizes that are more "
+      "No choice of as many such {}, repeats included, shows effects from sizes that are more "
       "than {:.0f} % smaller "
       "(geometric mean).\n",
-      std::ceil(100 * (1 - plan.best_share)));
+      pushes ? "pushes" : "chains", std::ceil(100 * (1 - plan.best_share)));
   const auto list = [&](const std::vector<std::string>& names, const std::string& label) {
     if (!names.empty()) text += joined(names) + label + "\n";
   };
   list(plan.not_planned_for, ": do not move where trials end, only how far repeats scatter");
   list(plan.without_shift, ": could not be simulated with this robot");
-  text +=
-      "Sizes are distances from neutral; -: not within the catalogue's bounds. What does not show "
-      "in poses at rest (motor_lag) needs paths: log them too.\n";
-  return text;
+  text += "Sizes are distances from neutral; -: not within the catalogue's bounds.";
+  if (!pushes) {
+    text += " What does not show in poses at rest (motor_lag) needs paths: log them too.";
+  }
+  return text + "\n";
 }
 
 constexpr auto kSeen = [](auto& v, auto& row) {
@@ -171,8 +172,8 @@ Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& cont
     }
     return run_plan_drive(options.drive, task, source.config, options.outputs, context);
   }
-  RETURN_IF_ERROR(apply_options(options, source.config));
   RETURN_IF_ERROR(check_can(source.config.problem.scenario, kSimulates, options.source));
+  RETURN_IF_ERROR(apply_options(options, source.config));
   const bool pushes = !source.config.problem.pieces.empty();
   std::vector<std::string> outputs = trial_file_names(options.out, false, pushes);
   outputs.push_back(options.picture);
@@ -197,10 +198,11 @@ Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& cont
   json["out"] = options.out;
   json["trials"] = plan.log.trials.size();
   context.console.result(
-      table_text(plan) + fmt::format("{}: {} trials to drive, in this order; x1, y1, theta1 are "
-                                     "where the model says the {} stops\n",
-                                     options.out, plan.log.trials.size(),
-                                     pushes ? "piece" : "robot"),
+      table_text(plan, pushes) +
+          fmt::format("{}: {} {}, in this order; x1, y1, theta1 are where the model says the {} "
+                      "stops\n",
+                      joined(files, " and ", &TrialFile::path), plan.log.trials.size(),
+                      pushes ? "pushes to make" : "trials to drive", pushes ? "piece" : "robot"),
       json);
   return kExitDone;
 }
