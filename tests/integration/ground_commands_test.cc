@@ -111,6 +111,19 @@ TEST_F(GroundCommands, ARobotsFileDoesNotPassSuppositionsForFacts) {
   EXPECT_THAT(text_of(out), HasSubstr("\n# assumed: a mass of 10 kg\n"));
 }
 
+TEST_F(GroundCommands, ImportNamesEveryFile) {
+  const std::string log =
+      folder_.write("log.csv", "t,x,y,theta,v,omega\n0,0,0,0,1,0\n1,1,0,0,1,0\n");
+  const std::string map = folder_.write(
+      "map.toml",
+      "[poses]\nt = \"t\"\nx = \"x\"\ny = \"y\"\ntheta = \"theta\"\n[commands]\nt = \"t\"\n"
+      "v = \"v\"\nomega = \"omega\"\n[wheels]\nt = \"t\"\nleft = \"v\"\nright = \"v\"\n");
+  const Finished done =
+      gapfarm_command({"import", "runs", log, "--map", map, "--out", folder_ / "in"});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_THAT(done.out, HasSubstr("(commands.csv, poses.csv, wheels.csv, map.toml)"));
+}
+
 TEST_F(GroundCommands, TheMedianOfTwoEndsIsTheirMean) {
   const Finished exported =
       gapfarm_command({"export", "runs", config("[runs]\nfolders = [\"monday\"]\n"), "--out",

@@ -94,8 +94,9 @@ Status check_map(const LogMap& map, const std::vector<Recording>& recordings) {
                "--print-map > map.toml lists the columns, --map map.toml uses it"};
 }
 
-Status write_files(const std::string& out, const RunFiles& files, const std::string& map,
-                   Outputs& outputs) {
+// Returns the names of those that there are.
+Result<std::vector<std::string>> write_files(const std::string& out, const RunFiles& files,
+                                             const std::string& map, Outputs& outputs) {
   const Outputs::NamedTexts all = {{"commands.csv", files.commands},
                                    {"poses.csv", files.poses},
                                    {"wheels.csv", files.wheels},
@@ -106,7 +107,8 @@ Status write_files(const std::string& out, const RunFiles& files, const std::str
     if (!text.empty()) names.push_back(name);
   }
   RETURN_IF_ERROR(outputs.plan_in(out, names));
-  return outputs.write_in(out, all);
+  RETURN_IF_ERROR(outputs.write_in(out, all));
+  return names;
 }
 
 Result<int> import_runs(ImportOptions& options, CliContext& context) {
@@ -145,9 +147,10 @@ Result<int> import_runs(ImportOptions& options, CliContext& context) {
                  ":1: found no run with two poses and commands, expected one; give the files of "
                  "both, in the same order"};
   }
-  RETURN_IF_ERROR(write_files(options.out, format_runs(runs.log), map_text, outputs));
+  ASSIGN_OR_RETURN(const auto names,
+                   write_files(options.out, format_runs(runs.log), map_text, outputs));
   const std::string done = std::to_string(runs.log.runs.size()) + " runs written to " +
-                           options.out + " (commands.csv, poses.csv, map.toml)\n";
+                           options.out + " (" + joined(names) + ")\n";
   console.result((options.map.empty() ? map_text + "\n" : "") + done,
                  {{"out", options.out},
                   {"runs", runs.log.runs.size()},
