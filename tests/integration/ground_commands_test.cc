@@ -103,6 +103,15 @@ TEST_F(GroundCommands, WatchNamesTheOneFolderOfARobotsFile) {
   EXPECT_THAT(watched.err, HasSubstr("put robot.toml into " + (folder_ / "fleet") + ", or name"));
 }
 
+TEST_F(GroundCommands, WatchCountsTheRunsThatItFitted) {
+  write_runs("fleet/run1", {2}, 10);
+  write_runs("fleet/run2", {0.2});  // too short
+  folder_.write("fleet/robot.toml", text_of(robot_));
+  const Finished watched =
+      gapfarm_command({"watch", folder_ / "fleet", "--out", folder_ / "watched"});
+  EXPECT_THAT(watched.out, HasSubstr(" 1 runs, 1 of them fitted now")) << watched.err;
+}
+
 TEST_F(GroundCommands, ARobotsFileDoesNotPassSuppositionsForFacts) {
   const std::string out = folder_ / "whole.toml";
   const Finished described = gapfarm_command({"robot", robot_, "--out", out});

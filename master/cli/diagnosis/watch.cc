@@ -187,17 +187,18 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
       const std::string key =
           Hasher().add(kFitVersion).add(format_robot(driven)).add(log_hash(log)).finish();
       std::optional<Result<OffsetFit>> fit = cache.find(key);
-      if (!fit) {
+      const bool now = !fit;
+      if (now) {
         context.console.progress(
             fmt::format("fitting run {} of {}: {}/{}", done, all, robot.name, run.name));
         fit = fit_run_values(driven, log, {{0.5, 2, 5}, 0.5});
         cache.keep(key, *fit);
-        ++fleet->fitted;
       }
       if (!*fit) {
         fleet->skipped.push_back({robot.name, run.name, fit->error().message});
         continue;
       }
+      fleet->fitted += now ? 1 : 0;
       to.runs.push_back(run.name);
       to.fits.push_back(**fit);
       to.times_s.push_back(begin_s);
