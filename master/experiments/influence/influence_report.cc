@@ -113,30 +113,33 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
   }
   growth.series = {apart, allowed};
   page.picture(line_chart(growth), growth.title);
+  std::vector<std::vector<std::string>> alone, morris;
+  for (const FactorInfluence& f : report.factors) {
+    const auto row = [&](const Influence& of, std::vector<std::string> more) {
+      std::vector<std::string> cells = {table[f.gene.row].key,         distance_text(of.distance),
+                                        interval_text(of.distance_95), p_text(of.p),
+                                        of.influential ? "yes" : "no", std::to_string(of.failures)};
+      cells.insert(cells.begin() + 1, more.begin(), more.end());
+      return cells;
+    };
+    alone.push_back(row(f.alone, {gene_range(f.gene, table), table.format(f.gene.row, f.level)}));
+    morris.push_back(row(f.morris, {distance_text(f.sigma)}));
+  }
   page.heading("One parameter at a time");
   page.picture(
       bar_chart("Furthest level of each parameter", "m from the standard's path, median",
                 bars_of(report, table, &FactorInfluence::alone), report.repeat_distance, "repeats"),
       "bars of distances, the influential ones filled");
+  page.table(
+      {"parameter", "range", "furthest at", "m", "95 %", "p", "influential", "runs that failed"},
+      alone);
   page.heading("Morris: one parameter a step, all over the box");
   page.picture(bar_chart("Mean distance a step of two thirds of the range moves the path", "m",
                          bars_of(report, table, &FactorInfluence::morris),
                          report.box_repeat_distance, "repeats"),
                "bars of mean distances, the influential ones filled");
-  page.heading("Numbers");
-  std::vector<std::vector<std::string>> rows;
-  for (const FactorInfluence& f : report.factors) {
-    rows.push_back({table[f.gene.row].key, gene_range(f.gene, table),
-                    table.format(f.gene.row, f.level), distance_text(f.alone.distance),
-                    interval_text(f.alone.distance_95), p_text(f.alone.p),
-                    f.alone.influential ? "yes" : "no", distance_text(f.morris.distance),
-                    interval_text(f.morris.distance_95), distance_text(f.sigma), p_text(f.morris.p),
-                    f.morris.influential ? "yes" : "no",
-                    std::to_string(f.alone.failures + f.morris.failures)});
-  }
-  page.table({"parameter", "range", "furthest at", "m", "95 %", "p", "influential", "Morris m",
-              "95 %", "sigma", "p", "influential", "runs that failed"},
-             rows);
+  page.table({"parameter", "sigma, m", "mean, m", "95 %", "p", "influential", "runs that failed"},
+             morris);
   return page.finish();
 }
 

@@ -264,7 +264,10 @@ std::string bar_chart(const std::string& title, const std::string& x_title,
   if (mark) {
     svg.line({x_of(*mark), kPlotY - 6}, {x_of(*mark), kPlotY + height},
              {.stroke = "#d55e00", .stroke_width = 1.6, .dash = "5 4"});
-    svg.text({x_of(*mark) + 4, kPlotY - 6}, mark_name, {.size = 11, .colour = "#d55e00"});
+    const bool left = axis.share(*mark) > 0.5;  // of its line, where there is room
+    svg.text(
+        {x_of(*mark) + (left ? -4 : 4), kPlotY - 6}, mark_name,
+        {.size = 11, .colour = "#d55e00", .anchor = left ? SvgAnchor::kEnd : SvgAnchor::kStart});
   }
   svg.text({kNames + width / 2, kPlotY + height + 40}, x_title,
            {.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle});
