@@ -68,9 +68,10 @@ std::string command_line() {
 }
 
 void KeepOption::declare(CLI::App& app) {
-  app.add_option("--keep", folder,
-                 "Folder for what is simulated, so that a stopped command goes on (default: "
-                 "OUT.partial or, without a file, one in ~/.local/state/gapfarm; gone at the end)")
+  app.add_option(
+         "--keep", folder,
+         "Folder for what is simulated, so that a stopped command goes on (default: "
+         "OUT.partial or, without a file, one in ~/.local/state/gapfarm; gone when finished)")
       ->type_name("FOLDER");
 }
 
