@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/math/rank_tests.h"
 #include "common/random/stream.h"
@@ -91,8 +92,7 @@ class InfluenceStudy {
     const auto samples_of = [&](double horizon_s) {
       return static_cast<std::size_t>(std::floor(horizon_s / interval_s + 1e-9)) + 1;
     };
-    report_.horizon_s = longest_s / kHorizons;
-    bool calm = true;
+    double least_share = std::numeric_limits<double>::infinity();
     for (int i = 1; i <= kHorizons; ++i) {
       HorizonPoint point{longest_s * i / kHorizons, 0, 0};
       samples_ = samples_of(point.horizon_s);
@@ -102,8 +102,11 @@ class InfluenceStudy {
       }
       point.repeat_distance = median(distances);
       point.extent = set_extent(nominal_, samples_);
-      calm = calm && point.repeat_distance <= settings_.chaos_share * point.extent;
-      if (calm) report_.horizon_s = point.horizon_s;
+      // Before a finger touches its piece the noise of the start is all there is.
+      const double share = point.repeat_distance / std::max(point.extent, kLeast_m);
+      if (share <= std::max(settings_.chaos_share, least_share))
+        report_.horizon_s = point.horizon_s;
+      least_share = std::min(least_share, share);
       report_.horizons.push_back(point);
     }
     if (settings_.horizon_s) report_.horizon_s = std::min(*settings_.horizon_s, longest_s);

@@ -132,6 +132,22 @@ TEST(Stability, FindsCalmerSettings) {
   EXPECT_GE(report->evaluations, 60U);
 }
 
+TEST(Influence, OfPushesLooksBeyondTheFirstTouch) {
+  tests::WorkerFarm farm;
+  const Problem problem = tests::push_problem();
+  InfluenceSettings settings;
+  settings.trace.trials = {2, 5};
+  settings.repeats = 8;
+  settings.levels = 2;
+  settings.trajectories = 4;
+  const std::vector<Gene> genes = {{row_of(Push::kFingerFriction), 0.05, 1}};
+  const auto report = find_influence(farm, problem, genes, settings);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_LT(report->horizons.front().extent, 1e-6) << "nothing has moved yet";
+  EXPECT_GT(report->horizon_s, 0.6);
+  EXPECT_TRUE(report->factors.front().alone.influential);
+}
+
 // Corners keep their distances on every path; ends scatter as the starts do.
 TEST(PushPaths, FollowEveryCornerOfEveryPush) {
   Problem problem = tests::push_problem();
