@@ -185,7 +185,9 @@ Status RunStore::begin_epoch() {
       {unix_now_s(), "master", "", host_name(), "master " + std::to_string(epoch_) + " begins"}};
   if (epoch_ > 1) events.insert(events.begin(), end_before_);
   ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database_));
-  RETURN_IF_ERROR(database_.exec(forget_incidents(next_generation()), "write the run store"));
+  RETURN_IF_ERROR(database_.exec("CREATE TEMP TABLE progress_before AS SELECT * FROM progress; " +
+                                     forget_incidents(next_generation()),
+                                 "write the run store"));
   RETURN_IF_ERROR(insert_worker_events(events));
   RETURN_IF_ERROR(set_progress({}));
   return transaction.commit();
@@ -292,6 +294,10 @@ Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
   const std::string operation =
       "keep the generations after " + std::to_string(generation) + " in " + backup.string();
   RETURN_IF_ERROR(database_.run(operation, "VACUUM INTO ?", backup.string()));
+  // The copy ends as the master before left it; this one goes on elsewhere.
+  RETURN_IF_ERROR(database_.run(operation, "ATTACH ? AS copy", backup.string()));
+  RETURN_IF_ERROR(database_.exec(
+      "REPLACE INTO copy.progress SELECT * FROM temp.progress_before; DETACH copy", operation));
   RETURN_IF_ERROR(sync_to_disk(backup));
   RETURN_IF_ERROR(sync_to_disk(run_));
 

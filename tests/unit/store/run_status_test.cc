@@ -65,6 +65,21 @@ TEST_F(RunStatusTest, ReportsACrashFromAnEnd) {
 }
 
 // A master on another host whose lock cannot be seen from here is judged by its heartbeat.
+TEST_F(RunStatusTest, OfAKeptTailIsWhatItsMasterLeft) {
+  {
+    Result<RunStore> store = RunStore::create(run(), example_info());
+    for (const std::uint64_t g : {1, 2}) ASSERT_TRUE(store->commit(example_generation(g)).ok());
+    Progress end;
+    end.state = RunState::kFinished;
+    end.stop_reason = "completed";
+    ASSERT_TRUE(store->set_progress(end).ok());
+  }
+  const auto backup = RunStore::open(run())->truncate_after(1);
+  const auto kept = run_status(RunReader::open(*backup).value(), 0);
+  EXPECT_EQ(kept->state, RunState::kFinished);
+  EXPECT_EQ(kept->stop_reason, "completed");
+}
+
 TEST_F(RunStatusTest, TrustsAFreshHeartbeatOfAnotherHost) {
   { Result<RunStore> store = RunStore::create(run(), example_info()); }
   {
