@@ -13,6 +13,7 @@
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
 #include "common/base/hash.h"
+#include "common/base/text.h"
 #include "common/json/json.h"
 #include "common/process/child.h"
 #include "common/trials/files.h"
@@ -63,7 +64,7 @@ std::string state_of_exit(int exit_code) {
 
 std::string command_line() {
   std::string text = "gapfarm";
-  for (const std::string& word : own_arguments()) text += " " + word;
+  for (const std::string& word : own_arguments()) text += " " + shell_quoted(word);
   return text;
 }
 

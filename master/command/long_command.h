@@ -18,7 +18,7 @@
 
 namespace gapfarm {
 
-// What this process was called with: "gapfarm diagnose ...".
+// What this process was called with, to paste into a shell: "gapfarm diagnose ...".
 std::string command_line();
 
 struct KeepingPlace {

@@ -152,7 +152,7 @@ TEST_F(LongCommands, StudiesOfPathsGoOnAndForgetThePaths) {
 }
 
 TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
-  const std::string out = folder_ / "diagnosis";
+  const std::string out = folder_ / "a diagnosis";
   const std::string fine = shipped_config("srv1.toml", 960);  // takes some seconds
   const std::vector<std::string> arguments = {
       "diagnose", folder_.write("fine.toml", fine), "--trials", kDemoLog, "--out", out, "--workers",
@@ -183,7 +183,8 @@ TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
   EXPECT_EQ(dead["state"], "stopped");
   EXPECT_THAT(dead["stop_reason"].get<std::string>(), HasSubstr("crashed"));
   EXPECT_TRUE(dead["time_left_s"].is_null());
-  EXPECT_THAT(gapfarm_command({"status", out}).out, HasSubstr("gapfarm diagnose "));
+  EXPECT_THAT(gapfarm_command({"status", out}).out, HasSubstr(" --out '" + out + "' "))
+      << "to paste into a shell";
   // The second one waits in vain for the first one's folder.
   RunningProgram again("gapfarm", arguments);
   ASSERT_TRUE(wait_until([&] { return status()["state"] == "running"; }));
