@@ -107,6 +107,13 @@ std::string origin_name(unsigned origin) {
   return text;
 }
 
+bool is_operator(const std::string& name) {
+  for (unsigned kind = kOnePoint; kind <= kUniformReset; kind <<= 1) {
+    if (name == origin_name(kind)) return true;
+  }
+  return name == "no_crossover" || name == "no_mutation";
+}
+
 void Standing::add(const Score& score) {
   const auto finite = [](double c) { return std::isfinite(c); };
   const bool all_finite = finite(score.cost) && std::ranges::all_of(score.costs, finite);

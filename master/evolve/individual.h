@@ -32,6 +32,9 @@ enum Origin : unsigned {
   kGiven = 1u << 14,            // begun with (SearchStart)
 };
 std::string origin_name(unsigned origin);  // "blend+gaussian"
+// Whether operator_probabilities() states by this name how often one is drawn, or that none is;
+// figures of other searches stand beside them.
+bool is_operator(const std::string& name);
 
 // OK by cost, then INFEASIBLE by cost, then the other outcomes in the enum's order, unspecified
 // last. A strict weak order: no NaN gets here.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/text.h"
+#include "master/evolve/individual.h"
 #include "master/report/html.h"
 #include "master/run/run_page.h"
 #include "master/store/run_lock.h"
@@ -31,16 +32,19 @@ std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
 }
 
 void add_operators(const std::vector<StoredGeneration>& generations, RunReport* report) {
-  for (const auto& [name, share] : generations.back().operator_probabilities) {
-    if (name == "front" || name == "hypervolume") return;  // no probabilities
-    report->operators.push_back(name);
-  }
+  const auto drawn = [](const StoredGeneration& g) {
+    auto operators = g.operator_probabilities;
+    std::erase_if(operators, [](const auto& figure) { return !is_operator(figure.first); });
+    return operators;
+  };
+  for (const auto& [name, share] : drawn(generations.back())) report->operators.push_back(name);
   if (report->operators.empty()) return;
   for (const std::size_t i : some_of(generations.size(), kMostSteps)) {
     const StoredGeneration& g = generations[i];
-    if (g.operator_probabilities.size() != report->operators.size()) continue;
+    const auto operators = drawn(g);
+    if (operators.size() != report->operators.size()) continue;
     std::vector<double>& shares = report->probabilities.emplace_back();
-    for (const auto& [name, share] : g.operator_probabilities) shares.push_back(share);
+    for (const auto& [name, share] : operators) shares.push_back(share);
     report->probability_generations.push_back(g.generation);
   }
 }

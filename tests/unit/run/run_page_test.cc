@@ -32,7 +32,8 @@ class RunPage : public testing::Test {
     g.generation = number;
     g.evaluations = kPopulation * number;
     g.wall_s = 1.2345678901;
-    g.operator_probabilities = {{"blend", 0.123456789}, {"gaussian", 0.876543211}};
+    g.operator_probabilities = {
+        {"step_size", 8}, {"blend", 0.123456789}, {"gaussian", 0.876543211}};
     for (std::size_t i = 0; i < kPopulation; ++i) {
       StoredIndividual one;
       one.birth_id = kPopulation * number + i;
@@ -85,6 +86,8 @@ TEST_F(RunPage, StaysSmallHoweverLongTheRun) {
   EXPECT_LT(page.size(), 2'000'000u);
   EXPECT_EQ(report.elite.lines.size(), kPopulation);
   EXPECT_EQ(report.elite.axes.size(), 2u);
+  EXPECT_THAT(report.operators, testing::ElementsAre("blend", "gaussian")) << "no step sizes";
+  EXPECT_THAT(report.probabilities.back(), testing::ElementsAre(0.123456789, 0.876543211));
 }
 
 TEST_F(RunPage, FindsAnyGenomeAndTheBestOfAnyGeneration) {
