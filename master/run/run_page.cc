@@ -93,11 +93,14 @@ std::string action(const RunReport& report, const RunInfo& info) {
   if (const auto keys = keys_at_bounds(report.parameters); !keys.empty()) {
     return "Widen the range of " + keys.front() + " in [genes]: the best value lies at its end.";
   }
-  if (report.objective)
-    return "gapfarm resume " + shell_quoted(report.name) + " --generations N searches on.";
-  if (!report.outcome) return "gapfarm resume " + shell_quoted(report.name) + " goes on.";
+  const std::string run = shell_quoted(report.name);
+  if (report.objective) return "gapfarm resume " + run + " --generations N searches on.";
+  if (!report.outcome) return "gapfarm resume " + run + " goes on.";
   if (report.outcome->validation.empty()) {
-    return "Judge it on trials that it has not seen: gapfarm predict RUN --trials OTHER.csv";
+    return report.windows ? "Judge it on runs that it has not seen: gapfarm horizons " + run +
+                                " --trials FOLDER"
+                          : "Judge it on trials that it has not seen: gapfarm predict " + run +
+                                " --trials OTHER.csv";
   }
   return "Ask what is missing: gapfarm diagnose " + shell_quoted(info.config_path) +
          " --out DIAGNOSIS";

@@ -154,6 +154,7 @@ TEST_F(GroundCommands, ARunAndADiagnosisGoOnFromAnyFolder) {
       "\"$G\" export runs ../run --out paths && \"$G\" export ranges ../found --out ranges");
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(status("run")["generation"], 2);
+  EXPECT_THAT(text_of(folder_ / "run/report.html"), HasSubstr("gapfarm horizons ../run --trials"));
   EXPECT_THAT(resumed.err, Not(HasSubstr("has changed")));
   folder_.write("robot.toml", text_of(robot_) + "# another\n");
   const Finished changed = shell("\"$G\" resume run --generations 3 --workers 1");
