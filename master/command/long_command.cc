@@ -243,7 +243,14 @@ void LongCommand::write_record() {
   if (Status s = answers_->set_command(text); !s) console_.error(s.error());
 }
 
+bool LongCommand::holds_nothing() const {
+  const Result<std::int64_t> kept = answers_->count();
+  return kept && *kept == 0;
+}
+
 std::string LongCommand::how_to_go_on() const {
+  if (also_.empty() && holds_nothing())
+    return "stopped before anything was simulated; the same command begins anew";
   return "stopped; what was " + (also_.empty() ? "simulated" : also_) + " is kept in " +
          (also_.empty() ? answer_file(place_.folder).string() : also_in_) +
          ", and the same command goes on from there";
@@ -267,8 +274,7 @@ void LongCommand::end(int exit_code) {
                    : record_.state == "failed"
                        ? "failed with exit code " + std::to_string(exit_code)
                        : "";
-  const Result<std::int64_t> kept = answers_->count();
-  if (place_.passing && (record_.state == "finished" || (kept && *kept == 0))) {
+  if (place_.passing && (record_.state == "finished" || holds_nothing())) {
     answers_.reset();
     lock_.reset();
     std::error_code ignored;

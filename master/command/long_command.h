@@ -82,6 +82,7 @@ class LongCommand {
   void on_progress(const RecordedProgress& progress, const Farm& farm, WorkerWait& wait);
   void show(bool news = false);
   void write_record();
+  bool holds_nothing() const;  // REQUIRES: keeps()
 
   Console& console_;
   KeepingPlace place_;

@@ -130,6 +130,18 @@ TEST_F(LongCommands, SimulationsGoOnBesideTheirFile) {
   EXPECT_EQ(text_of(folder_ / "sim.csv"), text_of(folder_ / "undisturbed.csv"));
 }
 
+TEST_F(LongCommands, StoppedBeforeItsFirstAnswerNothingIsKept) {
+  const std::string out = folder_ / "compared";
+  RunningProgram compare("gapfarm", {"compare", slow_, "--out", out, "--workers", "0", "--listen",
+                                     "ipc://" + folder_ / "farm"});
+  ASSERT_TRUE(wait_until([&] { return record(out).has_value(); })) << compare.err();
+  compare.send(SIGTERM);
+  const Finished stopped = compare.wait();
+  EXPECT_EQ(stopped.exit_code, kStopped);
+  EXPECT_THAT(stopped.err,
+              AllOf(HasSubstr("the same command begins anew"), Not(HasSubstr("kept"))));
+}
+
 TEST_F(LongCommands, DeterminingGoesOn) {
   // A determination scores little, and a command reports how far it is once a second.
   std::string text = demo_config(10, 6, kMoreGenes);
