@@ -128,7 +128,7 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
     return because(StopReason::kEvaluations, "used ", optimiser.evaluations(),
                    " evaluations, the limit was ", *s.evaluations);
   }
-  if (s.time_s && wall_s >= *s.time_s) {
+  if (s.time_s && generation > 0 && wall_s >= *s.time_s) {
     return because(StopReason::kTime, "used the ", *s.time_s, " s allowed");
   }
   const std::uint64_t idle = generation - optimiser.last_improvement();
@@ -267,7 +267,7 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, const ScoreCandidates& score,
                              const KeepGeneration& keep, const EvolveClock& clock,
                              const EvolveOptions& options,
                              const std::function<bool()>& stop_requested) {
-  const double began_s = clock();
+  const double began_s = options.began_s.value_or(clock());
   const auto spent_s = [&] { return options.spent_s + clock() - began_s; };
   const auto requested = [&] { return stop_requested && stop_requested(); };
 
@@ -283,11 +283,10 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, const ScoreCandidates& score,
     if (!requested()) return status.error();
     return summarise(optimiser, *reason_to_stop(optimiser, options, spent_s(), true), spent_s());
   }
-  for (;;) {
+  for (double committed_s = options.spent_s;;) {
     auto stop = reason_to_stop(optimiser, options, spent_s(), requested());
     if (stop) return summarise(optimiser, *stop, spent_s());
 
-    const double generation_began_s = clock();
     const std::uint64_t generation = optimiser.generation();
     while (optimiser.generation() == generation) {
       const auto scores = scores_of(score, optimiser.ask());
@@ -300,7 +299,8 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, const ScoreCandidates& score,
     }
 
     GenerationRecord record = record_generation(optimiser);
-    record.wall_s = clock() - generation_began_s;
+    record.wall_s = spent_s() - committed_s;
+    committed_s += record.wall_s;
     RETURN_IF_ERROR(keep(record));
   }
 }

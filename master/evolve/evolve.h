@@ -61,7 +61,10 @@ enum class StopReason {
 struct EvolveOptions {
   EvolutionSettings settings;  // the stop conditions
   FitnessKind fitness = FitnessKind::kLogScore;
-  double spent_s = 0;  // wall time before
+  double spent_s = 0;  // wall time of earlier masters
+  // When this one began, by the clock: what prepared the search (fits) counts for the first
+  // generation.  None: now.
+  std::optional<double> began_s;
 };
 
 struct EvolveSummary {

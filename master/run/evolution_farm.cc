@@ -105,7 +105,7 @@ void FarmEventKeeper::flush() {
 
 FarmProgressWriter::FarmProgressWriter(RunStore& store, Farm& farm,
                                        const EvolutionSettings& settings,
-                                       const std::optional<Checkpoint>& resumed,
+                                       const std::optional<Checkpoint>& resumed, double spent_s,
                                        const EvolveClock& clock, RunWatcher& watcher)
     : store_(store),
       farm_(farm),
@@ -113,12 +113,12 @@ FarmProgressWriter::FarmProgressWriter(RunStore& store, Farm& farm,
       clock_(clock),
       watcher_(watcher),
       began_s_(clock()),
+      spent_before_s_(spent_s),
       wait_(farm.endpoints()) {
   last_.listens(farm);
   if (!resumed) return;
   generation_ = resumed->generation;
   evaluations_of_others_ = resumed->evaluations;
-  wall_of_others_s_ = resumed->wall_s;
 }
 
 Progress FarmProgressWriter::now() const {
@@ -186,7 +186,7 @@ void FarmProgressWriter::refresh(double now_s) {
   Pace pace;
   pace.generation = generation_;
   pace.evaluations = evaluations_of_others_ + done;
-  pace.wall_s = wall_of_others_s_ + spent_s;
+  pace.wall_s = spent_before_s_ + spent_s;
   if (last_.total > 0) {
     pace.share = static_cast<double>(last_.done) / static_cast<double>(last_.total);
   }

@@ -54,10 +54,11 @@ class FarmEventKeeper {
 // Keeps the store's live row and the watcher's progress line fresh, about once a second.
 class FarmProgressWriter {
  public:
-  // `resumed`: where the run goes on; none at its start.
+  // `resumed`: where the run goes on; none at its start.  `spent_s`: wall time of the run until
+  // now.
   FarmProgressWriter(RunStore& store, Farm& farm, const EvolutionSettings& settings,
-                     const std::optional<Checkpoint>& resumed, const EvolveClock& clock,
-                     RunWatcher& watcher);
+                     const std::optional<Checkpoint>& resumed, double spent_s,
+                     const EvolveClock& clock, RunWatcher& watcher);
 
   // Evaluations of the generations that this life of the master has committed.
   std::uint64_t evaluations_before() const { return evaluations_before_; }
@@ -81,13 +82,12 @@ class FarmProgressWriter {
   const EvolutionSettings& settings_;
   const EvolveClock& clock_;
   RunWatcher& watcher_;
-  double began_s_;
+  double began_s_, spent_before_s_;
   double written_s_ = -1e9;
   std::uint64_t evaluations_before_ = 0;     // of this life of the master, generations done
   std::uint64_t generations_ = 0;            // of this life of the master
   std::uint64_t generation_ = 0;             // of the run
   std::uint64_t evaluations_of_others_ = 0;  // of earlier masters
-  double wall_of_others_s_ = 0;
   std::string best_;
   Progress last_;
   Log* log_ = nullptr;

@@ -125,6 +125,8 @@ Error stopped_by(RunStore& store, Error error, const Progress& last) {
 Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWatcher& watcher) {
   const auto inputs = read_inputs(store, request.config);
   if (!inputs) return stopped_by(store, inputs.error());
+  const EvolveClock clock = monotonic_seconds;
+  const double began_s = clock();
   FarmEventKeeper events(store, watcher);
   auto farm = request.open_farm([&](const FarmEvent& event) { events.keep(event); });
   if (!farm) return stopped_by(store, farm.error());
@@ -144,16 +146,17 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
     if (!note.empty()) watcher.note(note);
   }
 
-  const EvolveClock clock = monotonic_seconds;
-  FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,
-                              watcher);
+  const double of_others_s = inputs->checkpoint ? inputs->checkpoint->wall_s : 0;
+  FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint,
+                              of_others_s + clock() - began_s, clock, watcher);
   progress.watch(&request.log, &events);
   const ScoreCandidates score = farm_scores(**farm, request.problem, request.config.seed, progress);
   StoreSink sink(store, request.problem, **farm, progress);
   EvolveOptions options;
   options.settings = request.config.evolution;
   options.fitness = request.problem.fitness.kind;
-  if (inputs->checkpoint) options.spent_s = inputs->checkpoint->wall_s;
+  options.spent_s = of_others_s;
+  options.began_s = began_s;
   auto evolved = evolve(
       **optimiser, score, [&](const GenerationRecord& record) { return sink.commit(record); },
       clock, options, request.stop_requested);

@@ -98,6 +98,15 @@ TEST_F(EvolveTest, StopsAtItsTimeIncludingWhatWasSpentBefore) {
   EXPECT_EQ(summary.generations, 4U);  // 13 + 4 * 2 >= 20
 }
 
+TEST_F(EvolveTest, CountsTheTimeThatPreparedIt) {
+  options_.settings.time_s = 4;
+  options_.began_s = now_ - 5;
+  const EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.generations, 1U) << "a run has one, however long it was prepared";
+  EXPECT_EQ(summary.wall_s, 7);
+  EXPECT_EQ(sink_.records.front().wall_s, 7);
+}
+
 TEST_F(EvolveTest, StopsAtItsTargetInTheFitnesssOwnSense) {
   options_.settings.target_fitness = 0.5;
   options_.settings.generations = 1000;
