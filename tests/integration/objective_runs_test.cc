@@ -363,6 +363,7 @@ TEST_F(ObjectiveRuns, CheckCallsNoGeneIdleThatMovesAnyOfSeveralValues) {
   const json idle = json::parse(checked.out)["idle_genes"];
   ASSERT_EQ(idle.size(), 1u) << idle;
   EXPECT_EQ(idle[0]["parameter"], "side");
+  EXPECT_THAT(idle[0]["remedy"], HasSubstr("the program's answer does not depend on it"));
 }
 
 TEST_F(ObjectiveRuns, SeveralValuesNeedTheirNamesAndNsga2) {

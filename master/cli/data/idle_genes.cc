@@ -108,8 +108,10 @@ Result<std::string> remedy_of(Farm& farm, const Config& config, std::size_t gene
              " does not show it, log_score does: [fitness] kind = \"log_score\"";
     }
   }
-  return std::string(
-      "nothing in this log depends on it: leave it out of [genes], or drive what does");
+  return std::string(is_value(kind)
+                         ? "the program's answer does not depend on it: leave it out of [genes]"
+                         : "nothing in this log depends on it: leave it out of [genes], or drive "
+                           "what does");
 }
 
 }  // namespace
