@@ -36,6 +36,7 @@ expect condor '+ProjectName = "robots"' -- '+ProjectName = "robots"'
 expect kube 'runAsNonRoot: true'
 expect kube 'activeDeadlineSeconds: 600' --wall-time 600
 expect ssh ' a sh ' --host a --host b
+expect ssh ' b sh ' --host a --host b
 expect local '--processes 1 --wait-limit 30'
 # No secret goes anywhere but by its file.
 printed=$("$BIN/gapfarm" workers --on slurm --connect tcp://m:1 --keys "$T/keys" --max 2 --dry-run 2>&1)
@@ -52,6 +53,9 @@ expect_submit() {
 }
 expect_submit slurm '--signal=B:USR1@60' 'scontrol requeue' '--workers-on slurm'
 expect_submit sge '-notify' 'exit 99' '--workers-on sge'
+printed=$("$BIN/gapfarm" evolve configs/demo.toml --out "$T/run" --keys "$T/keys" --workers-on slurm --max 9 --dry-run 2>&1) ||
+  fail "$printed"
+[[ $printed == *'up to 9 workers'*'sbatch '*'--array=0-8'* ]] || fail "evolve printed: $printed"
 expect_submit pbs '-r y' 'qrerun' '--workers-on pbs'
 "$BIN/gapfarm" workers --on slurm --max 2 2>/dev/null && fail 'submitted without an endpoint'
 "$BIN/gapfarm" workers --on nowhere --max 2 --connect tcp://m:1 2>/dev/null && fail 'knew a system nowhere'

@@ -76,12 +76,10 @@ Result<std::unique_ptr<Farm>> open_farm(const RunStore& store, const Config& con
   return std::unique_ptr<Farm>(std::move(farm));
 }
 
-Result<std::unique_ptr<OwnedChild>> start_beside(const EvolutionOptions& options,
-                                                 const std::vector<std::string>& endpoints) {
+// Where workers of --workers-on find the master that listens there.
+Result<std::string> endpoint_of_fleet(const std::vector<std::string>& endpoints) {
   for (const std::string& endpoint : endpoints) {
-    if (endpoint.rfind("tcp://", 0) != 0) continue;
-    return start_workers_beside(options.fleet, reachable(endpoint, host_name()), options.farm.keys,
-                                options.farm.insecure);
+    if (endpoint.rfind("tcp://", 0) == 0) return reachable(endpoint, host_name());
   }
   return Error{"--workers-on needs an endpoint that workers reach; give --listen tcp://*:PORT"};
 }
@@ -137,6 +135,22 @@ void EvolutionOptions::declare(CLI::App& app) {
       ->group("");  // for tests
 }
 
+Result<int> print_evolution_dry_run(std::string would, Json facts, const EvolutionOptions& options,
+                                    const FarmSettings& settings, CliContext& context) {
+  if (!options.fleet.system.empty()) {
+    ASSIGN_OR_RETURN(const std::string endpoint, endpoint_of_fleet(options.farm.listen));
+    ASSIGN_OR_RETURN(const FleetLoopOptions loop,
+                     fleet_of(options.fleet, endpoint, options.farm.keys, options.farm.insecure));
+    const FleetLimits& limits = loop.fleet.limits;
+    std::string submission =
+        Fleet(loop.fleet, {}, {}).submission_text(limits.max_workers / limits.workers_per_job);
+    facts["submission"] = submission;
+    submission.pop_back();
+    would += fmt::format("\nwould submit up to {} workers by\n{}", limits.max_workers, submission);
+  }
+  return print_dry_run(would, std::move(facts), options.farm, settings, context);
+}
+
 Status EvolutionOptions::complete() {
   if (fleet.system.empty()) return {};
   RETURN_IF_ERROR(fleet.check());
@@ -180,7 +194,9 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
     ASSIGN_OR_RETURN(page, open_page(options.page, store.run(), context));
     auto made = open_farm(store, config, options, log, keep, context);
     if (!made || options.fleet.system.empty()) return made;
-    ASSIGN_OR_RETURN(beside, start_beside(options, (*made)->endpoints()));
+    ASSIGN_OR_RETURN(const std::string endpoint, endpoint_of_fleet((*made)->endpoints()));
+    ASSIGN_OR_RETURN(beside, start_workers_beside(options.fleet, endpoint, options.farm.keys,
+                                                  options.farm.insecure));
     return made;
   };
   const auto summary = evolve_run(

@@ -24,6 +24,10 @@ struct EvolutionOptions {
   Status complete();
 };
 
+// Of --dry-run: what the command does with these options, and what brings its workers.
+Result<int> print_evolution_dry_run(std::string would, Json facts, const EvolutionOptions& options,
+                                    const FarmSettings& settings, CliContext& context);
+
 // Makes a run folder and evolves in it.  What failed before its first generation is taken away
 // again, so that it is not in the way of the next attempt.
 Result<int> begin_run(const std::string& out, const Config& config, const EvolutionOptions& options,

@@ -47,14 +47,14 @@ Result<int> print_plan(const EvolveCommand& command, const Config& config, CliCo
                             ", seed " + std::to_string(config.seed) + ", population " +
                             std::to_string(config.evolution.population) + ", at most " +
                             std::to_string(config.evolution.generations) + " generations";
-  return print_dry_run(would,
-                       {{"out", command.out},
-                        {"genes", genes},
-                        {"trials", trials},
-                        {"seed", config.seed},
-                        {"population", config.evolution.population},
-                        {"generations", config.evolution.generations}},
-                       command.options.farm, config.farm, context);
+  return print_evolution_dry_run(would,
+                                 {{"out", command.out},
+                                  {"genes", genes},
+                                  {"trials", trials},
+                                  {"seed", config.seed},
+                                  {"population", config.evolution.population},
+                                  {"generations", config.evolution.generations}},
+                                 command.options, config.farm, context);
 }
 
 Result<int> run_evolve(EvolveCommand command, CliContext& context) {

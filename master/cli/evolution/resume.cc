@@ -95,11 +95,11 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
   note_changed_program(config, reader.info().created, context.console);
   const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
   const std::uint64_t from = std::min(command.branch.generation.value_or(last), last);
-  return print_dry_run(
+  return print_evolution_dry_run(
       "go on with " + command.run + " after generation " + std::to_string(from) + " to at most " +
           std::to_string(config.evolution.generations),
       {{"run", command.run}, {"generation", from}, {"generations", config.evolution.generations}},
-      command.options.farm, config.farm, context);
+      command.options, config.farm, context);
 }
 
 Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
@@ -120,13 +120,13 @@ Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
                            " into " + command.out + ", at most " +
                            std::to_string(config.evolution.generations) + " generations";
   if (context.dry_run) {
-    return print_dry_run(does,
-                         {{"run", command.run},
-                          {"out", command.out},
-                          {"generation", config.evolution.start.generation},
-                          {"genes", config.problem.genes.size()},
-                          {"generations", config.evolution.generations}},
-                         command.options.farm, config.farm, context);
+    return print_evolution_dry_run(does,
+                                   {{"run", command.run},
+                                    {"out", command.out},
+                                    {"generation", config.evolution.start.generation},
+                                    {"genes", config.problem.genes.size()},
+                                    {"generations", config.evolution.generations}},
+                                   command.options, config.farm, context);
   }
   context.console.note(command.out + ": " + does);
   return begin_run(command.out, config, command.options, overrides, *log, context);

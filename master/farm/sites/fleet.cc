@@ -342,9 +342,15 @@ std::string Fleet::submission_text(unsigned jobs) const {
   named["count"] = {std::to_string(count)};
   named["last"] = {std::to_string(count - 1)};
   named["index"] = {"0"};
-  named["node"] = {site.hosts.empty() ? "" : site.hosts.front()};
-  std::string text = joined(expand(site.submit, named), " ", shell_quoted);
-  return text + " <<'EOF'\n" + expand(site.script, named) + "EOF\n";
+  std::vector<std::string> nodes = site.hosts;
+  nodes.resize(nodes.empty() ? 1 : std::min<std::size_t>(nodes.size(), jobs));
+  std::string text;
+  for (const std::string& node : nodes) {
+    named["node"] = {node};
+    text += joined(expand(site.submit, named), " ", shell_quoted) + " <<'EOF'\n" +
+            expand(site.script, named) + "EOF\n";
+  }
+  return text;
 }
 
 }  // namespace gapfarm

@@ -44,7 +44,7 @@ class Fleet {
   bool drain(double now_s);
 
   FleetStatus status() const;
-  // What a submission of `jobs` jobs would run, for --dry-run.
+  // What a submission of `jobs` jobs would run, for --dry-run; of hosts, one on each.
   std::string submission_text(unsigned jobs) const;
 
  private:
