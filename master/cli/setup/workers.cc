@@ -45,8 +45,9 @@ Result<std::string> endpoint_of(const WorkersCommand& command) {
   if (progress.state == RunState::kRunning && !progress.listen.empty()) {
     return reachable(progress.listen, progress.host);
   }
+  const std::string more = progress.state == RunState::kFinished ? " --generations N" : "";
   return Error{folder + ": no master of it listens for workers now; `gapfarm resume " +
-               shell_quoted(folder) +
+               shell_quoted(folder) + more +
                " --listen tcp://*:5555`, or let it bring them itself with --workers-on"};
 }
 
