@@ -106,6 +106,7 @@ Status add_densities(const RunReader& reader, const Problem& problem,
   std::vector<StoredIndividual> elite = last;
   ASSIGN_OR_RETURN(report->front, run_front(reader, generations));
   const RunFront& front = report->front;
+  if (!front.objectives.empty()) report->fitness = front.objectives.front().name;
   if (!front.members.empty()) {
     elite = front.members;
     std::swap(elite.front(), elite[front.knee]);

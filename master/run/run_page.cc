@@ -113,6 +113,13 @@ std::string program_text(const Problem& problem) {
 std::string headline(const RunReport& report) {
   if (report.generations.empty()) return "No generation was completed yet.";
   const RunGeneration& last = report.generations.back();
+  if (!report.front.members.empty()) {
+    const auto& knee = report.front.members[report.front.knee].objectives;
+    return fmt::format("Knee of the front after {} generations: {}", last.generation,
+                       joined(knee, ", ", [](const auto& objective) {
+                         return objective.first + " " + number_text(objective.second, 6);
+                       }));
+  }
   return fmt::format("Best {} {} after {} generations", report.fitness,
                      last.best ? with_unit(number_text(*last.best, 6), report.unit)
                                : std::string("none that ended well"),

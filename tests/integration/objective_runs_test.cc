@@ -352,7 +352,9 @@ TEST_F(ObjectiveRuns, OfSeveralValuesTheFrontIsFoundAndAnyMemberMakesAModel) {
   EXPECT_THAT(history.substr(0, history.find('\n')),
               AllOf(HasSubstr("birth_id,generation,evaluations,wall_s"), HasSubstr(",bend"),
                     HasSubstr("objective.near,objective.far")));
-  EXPECT_THAT(text_of(folder_.path() / "page.html"), HasSubstr("What is traded off"));
+  EXPECT_THAT(text_of(folder_.path() / "page.html"),
+              AllOf(HasSubstr("What is traded off"), HasSubstr("generations: near "),
+                    HasSubstr(R"("best":"knee")"), Not(HasSubstr("Best value"))));
 }
 
 TEST_F(ObjectiveRuns, CheckCallsNoGeneIdleThatMovesAnyOfSeveralValues) {

@@ -37,14 +37,14 @@ function startProgress() {
       { x: { min: from, max: to > from ? to : from + 1, label },
         y: { ...(log ? { min: min / 1.05, max: max * 1.05 } : roomy(min, max, 0.06)), log, label: withUnit(fitness.name, fitness.unit) },
         layers: [
-          { kind: "band", style: "final", points: known.map((g) => [of(g), Math.min(low(g), g.best), Math.max(low(g), g.best)]), name: "best to worst" },
+          { kind: "band", style: "final", points: known.map((g) => [of(g), Math.min(low(g), g.best), Math.max(low(g), g.best)]), name: `${fitness.best} to worst` },
           { kind: "line", style: "quiet", points: line("median"), dashed: true, name: "median" },
-          { kind: "line", style: "final", points: line("best"), width: 2.5, name: "best" },
-          { kind: "points", style: "final", shape: "dot", points: marks, faint: known.length > 200 ? 0.01 : 0.6, name: "best" },
+          { kind: "line", style: "final", points: line("best"), width: 2.5, name: fitness.best },
+          { kind: "points", style: "final", shape: "dot", points: marks, faint: known.length > 200 ? 0.01 : 0.6, name: fitness.best },
         ],
-        describe: (g) => `generation ${g.generation}, ${numberText(g.evaluations, 6)} evaluations: best ${numberText(g.best, 6)}, median ${numberText(g.median, 4)}, worst ${numberText(g.worst, 4)}` },
+        describe: (g) => `generation ${g.generation}, ${numberText(g.evaluations, 6)} evaluations: ${fitness.best} ${numberText(g.best, 6)}, median ${numberText(g.median, 4)}, worst ${numberText(g.worst, 4)}` },
       `${fitness.name} by ${label}`,
-      `Line: best; dashed: median; shaded: best to worst. ${fitness.higher_is_better ? "Higher" : "Lower"} is better.`,
+      `Line: ${fitness.best}; dashed: median; shaded: ${fitness.best} to worst. ${fitness.higher_is_better ? "Higher" : "Lower"} is better.`,
       keep,
     );
   }

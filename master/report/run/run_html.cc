@@ -42,7 +42,7 @@ std::string front_section(const RunReport& report) {
 std::string understanding_section(const RunReport& report) {
   if (report.sample.evaluated.size() < 2) return "";
   std::string html =
-      R"(<section id="understanding"><h2>What the parameters do</h2><p>The share of the variance that each parameter explains alone, among what was evaluated: first-order Sobol indices from given data, on ranks (Plischke, Borgonovo and Smith 2013). They hold where the search was, not over the whole ranges; what parameters do together does not count, and parameters that moved together share what one of them does. 0 of fewer than 40 evaluations.</p><div id="importance-table" data-live>)";
+      R"(<section id="understanding"><h2>What the parameters do</h2><p>The share of the variance that each parameter explains alone, among what was evaluated: first-order Sobol indices from given data, on ranks (Plischke, Borgonovo and Smith 2013). They hold where the search was, not over the whole ranges; what parameters do together does not count, and parameters that moved together share what one of them does. Shares of fewer than 40 evaluations are not known and stand as 0.</p><div id="importance-table" data-live>)";
   std::vector<HtmlColumn> columns = {{"parameter"}};
   for (const std::string& output : report.sample.outputs) {
     columns.push_back({html_escaped(output) + ", %", "number", html_escaped(output)});
@@ -214,6 +214,7 @@ Json page_json(const RunReport& report) {
                {"fitness",
                 {{"name", report.fitness},
                  {"unit", report.unit},
+                 {"best", report.best_label()},
                  {"higher_is_better", report.higher_is_better}}},
                {"generations", generations_json(report)},
                {"operators", operators_json(report)},
@@ -281,7 +282,10 @@ std::string fitness_chart(const RunReport& report) {
   chart.y_title = report.fitness + (report.unit == "-" ? "" : " (" + report.unit + ")") +
                   (report.higher_is_better ? ", higher is better" : ", lower is better");
   chart.whole_x = true;
-  ChartSeries best{.name = "best, and down to the worst", .line = {}, .lower = {}, .upper = {}};
+  ChartSeries best{.name = report.best_label() + ", and down to the worst",
+                   .line = {},
+                   .lower = {},
+                   .upper = {}};
   ChartSeries median{.name = "median", .line = {}, .lower = {}, .upper = {}};
   std::vector<double> medians;
   for (const RunGeneration& point : report.generations) {

@@ -156,7 +156,7 @@ struct RunReport {
   std::vector<std::pair<std::string, std::string>> looked_up_values;
   std::string without_looked_up;  // why there is none, when one was asked for
   RunElite elite;
-  RunFront front;
+  RunFront front;  // not empty: `fitness` is the first of its objectives
   RunSample sample;
   RunFarm farm;
   std::size_t trials = 0;    // of the log
@@ -164,6 +164,9 @@ struct RunReport {
   std::size_t held_out = 0;  // trials of [validation] that a server can play
   bool served = false;       // by `gapfarm serve`: the page looks again while it is open
   std::vector<std::pair<std::string, std::string>> provenance;
+
+  // What a generation's first individual is called.
+  std::string best_label() const { return front.objectives.empty() ? "best" : "knee"; }
 };
 
 // About `most` of `points`, in order: the first, the last, and of each stretch between them the
