@@ -42,6 +42,11 @@ async function judgeKeys(page) {
 const NOT_NUMBERS = `[...document.querySelectorAll(".chart *")].filter((e) =>
   [...e.attributes].some((a) => /NaN|Infinity|undefined/.test(a.value))).length`;
 
+const CROSSED = `[...document.querySelectorAll(".chart")].filter((chart) => {
+  const title = chart.querySelector("text[transform]")?.getBoundingClientRect();
+  return title && [...chart.querySelectorAll("text[text-anchor=end]")].some((t) => t.getBoundingClientRect().left < title.right);
+}).length`;
+
 // A term is told beside it to who comes with keys, and goes at Escape.
 async function judgeTerms(page) {
   await page.run(`document.querySelector("a.term[href='#term-floor']").focus()`);
@@ -113,12 +118,17 @@ async function judgeRenderer(page) {
       { kind: "points", style: "final", shape: "dot", points: [[1, -5], [2, NaN]] },
     ] }, 800, 400);
     const d = svg.querySelector("g path").getAttribute("d");
-    return { ms: performance.now() - began, length: d.length, peak: d.includes(" " + px(toY(1e6))),
+    const ms = performance.now() - began;
+    document.body.append(host);
+    const crossed = ${CROSSED};
+    host.remove();
+    return { ms, crossed, length: d.length, peak: d.includes(" " + px(toY(1e6))),
              words: [...svg.querySelectorAll("text")].map((t) => t.textContent).join(" ") };
   })()`);
   if (pictures) console.log(`a line of 100,000 points: ${result.ms.toFixed(0)} ms, a path of ${result.length} characters`);
   check(result.length < 60_000, `renderer: a line of 100,000 points is a path of ${result.length} characters`);
   check(result.peak, "renderer: the one far point of a long line is not drawn");
+  check(result.crossed === 0, "renderer: long numbers lie on the axis' title");
   check(/0\.001 .*100/.test(result.words), `renderer: the log axis has the ticks ${result.words}`);
 }
 

@@ -17,7 +17,6 @@
 
 const MARK = { cross: 3, diamond: 3.6, dot: 2.4 };
 const ROOM = { left: 62, top: 8, right: 12, bottom: 46 };  // px around the plotting area
-const leftRoom = (spec) => spec.y.room || ROOM.left;       // rows with names may want more
 const SVG_NAMESPACE = "http://www.w3.org/2000/svg";
 const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
 
@@ -75,17 +74,24 @@ function scaleOf(axis, from, to) {
   };
 }
 
+// What the longest number beside the y axis takes, unless the spec states it.
+function leftRoom({ y }, height) {
+  const ticks = ticksOf(y, (height - ROOM.top - ROOM.bottom) / 36);
+  return y.room || Math.max(ROOM.left, ...ticks.map(([, text]) => Math.round(24 + 6.8 * text.length)));
+}
+
 // The ranges of a chart of that size.
 function fitted(spec, width, height) {
   if (!spec.equal) return spec;
-  const inner = { x: width - leftRoom(spec) - ROOM.right, y: height - ROOM.top - ROOM.bottom };
+  const room = leftRoom(spec, height);
+  const inner = { x: width - room - ROOM.right, y: height - ROOM.top - ROOM.bottom };
   const unit = Math.max(...["x", "y"].map((k) => (spec[k].max - spec[k].min) / inner[k]));
   const around = (k) => {
     const middle = (spec[k].min + spec[k].max) / 2;
     const half = (unit * inner[k]) / 2;
     return { ...spec[k], min: middle - half, max: middle + half };
   };
-  return { ...spec, x: around("x"), y: around("y") };
+  return { ...spec, x: around("x"), y: around("y"), room };
 }
 
 const within = ({ x, y }, [px, py]) => px >= x.min && px <= x.max && py >= y.min && py <= y.max;
@@ -264,7 +270,7 @@ let clipCount = 0;
 // Draws `spec` into `host`.  Gives the scales, their inverses and the plotting area, in px.
 function drawPlot(host, spec, width, height) {
   const svg = svgElement(host, "svg", { class: "chart", viewBox: `0 0 ${width} ${height}`, width, height, "font-family": FONT });
-  const box = { left: leftRoom(spec), top: ROOM.top, right: width - ROOM.right, bottom: height - ROOM.bottom };
+  const box = { left: spec.room || leftRoom(spec, height), top: ROOM.top, right: width - ROOM.right, bottom: height - ROOM.bottom };
   const x = scaleOf(spec.x, box.left, box.right);
   const y = scaleOf(spec.y, box.bottom, box.top);
   drawAxes(svg, spec, box, x.to, y.to);
