@@ -30,7 +30,8 @@ constexpr int kTurns = 8;
 constexpr int kScanRounds = 3;
 constexpr int kRounds = 40, kFaultRounds = 8;
 constexpr double kShift_s = 0.05, kMostShift_s = 1;  // between clocks that rows make one
-
+// A grip that was never reached has no upper end that shows, and none below that does not: half of
+// how far it may fall, in its logarithm, before another one is distinguished.
 constexpr double kMostUnsureGrip = 2, kGripStep = 0.1;
 constexpr double kSharpGrip = 1.8;  // of its shape
 

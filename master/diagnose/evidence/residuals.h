@@ -80,6 +80,8 @@ struct ReadingGap {
 };
 std::vector<ReadingGap> reading_gaps(const TrialLog& log,
                                      const std::vector<TrialContext>& contexts);
+// Those, and what was taken for a move of the robot but lies where an end reading up to
+// kOldestReading_s too old would leave it; `end_velocity` is in the axes of each trial's end.
 std::vector<ReadingGap> late_reading_gaps(const std::vector<ResidualTrial>& trials,
                                           const std::vector<Eigen::Vector3d>& end_velocity,
                                           const PoseNoise& noise);

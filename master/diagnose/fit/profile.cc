@@ -14,9 +14,7 @@ namespace {
 // Standard errors to either side: the ends of a 95 % interval.  With less room than a quarter of
 // that a bound decides, and the rise says nothing.
 constexpr double kAside = 2, kLeastAside = 0.5;
-// Steps in which the others follow (straight valleys need none), moves to somewhere better, and
-// rounds of the fit that goes on from there: chosen for the CPU seconds that they cost, on blind
-// checks of seeds 41, 43 and 47.
+// Steps in which the others follow: straight valleys need none.
 constexpr int kFollowing = 2;
 
 struct Aside {
