@@ -258,10 +258,10 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
                          gap_split_html(diagnosis)));
   frame.add(
       "parameters", "Parameters",
-      parameters_section(
-          diagnosis.parameters, diagnosis.correlations,
-          {{"tuned", "tuned"}, {"final", "final"}, {"interval", "90 % interval"}},
-          "None: nothing was named, or an earlier version made this file and did not keep them."));
+      parameters_section(diagnosis.parameters, diagnosis.correlations,
+                         {{"tuned", "tuned"}, {"final", "final"}, {"interval", "90 % interval"}},
+                         "None of a config: nothing was named, or what was named stands in "
+                         "robot.toml beside this page."));
   if (driven) {
     frame.add("floor", "Floor", floor_section());
     frame.add("drives", "Drives", drives_section({"tuned model", "final model"}));

@@ -11,8 +11,8 @@ namespace gapfarm {
 namespace {
 
 // What a simulation of other physics gets wrong of one push by itself, along it, across it and in
-// turn, as kMisfit is of all: root mean squares of the means of repeats by a simulator with friction
-// all over the face (docs/pushing.md).
+// turn, as kMisfit is of all: root mean squares of the means of repeats by a simulator with
+// friction all over the face (docs/pushing.md).
 constexpr double kConditionMisfit[] = {0.02, 0.01, 0.01};
 constexpr double kFarArm = 2;  // gyration radii: beyond, the finger slips off
 

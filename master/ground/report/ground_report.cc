@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <span>
 
 #include "common/base/ranges.h"
@@ -36,6 +37,7 @@ class GroundReport {
   void faults();
   void values();
   void figures();
+  void share_with_faults();
   void screening();
   void trials();
   // What is beyond doubt, a warning of the log's too.
@@ -129,7 +131,6 @@ void GroundReport::faults() {
                     "what was measured.",
                     h.thing, source_of(robot_), std::exp(gap / 3)),
         h.remedy);
-    effect.closed = effect.closed_hi = 1;
     effect.gap_before = gap;
     effect.text += " " + h.remedy;
     d_.effects.push_back(std::move(effect));
@@ -189,25 +190,29 @@ void GroundReport::figures() {
   const double floor = mean(search_.best.nats);
   const WindowFit &file = search_.chain.front(), &named = search_.chain.back();
   d_.gap = {floor - mean(file.nats), floor - mean(named.nats), 0};
+  share_with_faults();
   d_.position_mm = {rms_mm(file), rms_mm(named), rms_mm(search_.best)};
   d_.heading_mrad = {rms_mrad(file), rms_mrad(named), rms_mrad(search_.best)};
-  if (search_.reference) {
-    d_.cautions.push_back(
-        "Against the reference's log: sizes and intervals are of the change, what the reference "
-        "leaves unsure is in them.");
+  std::ranges::copy(cautions_of(robot_, search_), std::back_inserter(d_.cautions));
+}
+
+// The gap is the log's as it was: what putting it right closes is a part, what values close is a
+// share of the rest.
+void GroundReport::share_with_faults() {
+  const double rest = std::max(0.0, d_.gap.tuned);
+  double faults = 0;
+  const std::span<NamedEffect> of_faults(d_.effects.data(), search_.faults.size());
+  for (const NamedEffect& fault : of_faults) faults += fault.gap_before;
+  if (of_faults.empty() || !(faults + rest > 0)) return;
+  for (NamedEffect& effect : d_.effects) {
+    for (double* share : {&effect.closed, &effect.closed_lo, &effect.closed_hi}) {
+      *share *= rest / (faults + rest);
+    }
   }
-  if (search_.windows.blocks < 8) {
-    d_.cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
+  for (NamedEffect& fault : of_faults) {
+    fault.closed = fault.closed_lo = fault.closed_hi = fault.gap_before / (faults + rest);
   }
-  if (search_.log.relative) {
-    d_.cautions.push_back(
-        "Poses are relative, each to the one before: nothing with a place or a direction in the "
-        "world can show (tilts, patches, edges); lengths are as the sensor's own scale has them.");
-  }
-  if (robot_.measured && !search_.loop) {
-    d_.cautions.push_back(
-        "Wheel speeds were measured: what lies before them (dead time, ramps) cannot show.");
-  }
+  d_.gap.tuned += faults;
 }
 
 void GroundReport::judge() {

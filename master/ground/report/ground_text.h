@@ -88,6 +88,9 @@ std::string values_that_would_move(const GroundSearch& search);
 // What robot.toml has beside what is named; empty: nothing.
 std::string further_values(const GroundSearch& search, const std::vector<ReportedValue>& values);
 
+// What to keep in mind about the runs, whatever was found; a sentence each.
+std::vector<std::string> cautions_of(const GroundRobot& robot, const GroundSearch& search);
+
 // The one thing to do about it, by the verdict and the effects of `diagnosis`; a sentence.
 std::string what_to_do(const GroundRobot& robot, const GroundSearch& search,
                        const Diagnosis& diagnosis);

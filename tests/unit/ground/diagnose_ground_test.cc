@@ -243,6 +243,21 @@ TEST(DiagnoseGround, ARunThatIsTheOtherWayRoundAloneIsNamed) {
   }
 }
 
+TEST(DiagnoseGround, AFaultAndAValueShareTheGap) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog log = driven(robot, off_by({"right"}, {0.96}));
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses) row.X_WM = {100 * row.X_WM.x, 100 * row.X_WM.y, row.X_WM.theta};
+  }
+  const Diagnosis found = diagnosis_of(robot, log).diagnosis;
+  ASSERT_EQ(found.effects.size(), 2u) << found.headline;
+  const NamedEffect &fault = found.effects[0], &value = found.effects[1];
+  EXPECT_EQ(fault.name, "unit_error");
+  EXPECT_GT(value.closed, 0.01);
+  EXPECT_NEAR(fault.closed + value.closed, 1, 0.02);
+  EXPECT_NEAR(found.gap.tuned * fault.closed, fault.gap_before, 1e-9);
+}
+
 // Of one run alone a wheel is a fifth smaller: the others hide it from every fit to all.
 TEST(DiagnoseGround, ARunWithValuesOfItsOwnIsNamed) {
   const GroundRobot robot = robot_of(kDifferential);
