@@ -80,15 +80,10 @@ namespace {
 // still follows within milliseconds.
 constexpr double kEvenly = 0.3;
 
-// A skid-steer whose wheelbase is searched turns as was fitted by that, wherever its axles are;
-// else by its friction across.
-GroundRobot searched_robot(const Problem& problem, const Kinematics& kinematics) {
-  const GroundRobot& given = problem.ground->robot();
+// A start turns as was fitted by where a skid-steer's axles are: friction is the simulation's to
+// find.
+GroundRobot searched_robot(const GroundRobot& given, const Kinematics& kinematics) {
   GroundRobot robot = robot_with(given, kinematics);
-  const bool by_base = std::ranges::any_of(problem.genes, [&](const Gene& gene) {
-    return problem.table()[gene.row].key == "wheelbase";
-  });
-  if (robot.drive != DriveKind::kSkid || !by_base) return robot;
   const double times = robot.friction_ratio / given.friction_ratio;
   robot.friction_ratio = given.friction_ratio;
   for (RobotWheel& w : robot.wheels) *w.x_m *= times;
@@ -111,7 +106,7 @@ bool is_noise(const std::string& key) { return key.find("_noise_") != std::strin
 ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted) {
   ParameterValues values = problem.values;
   if (!fitted.values.allFinite()) return values;
-  const GroundRobot robot = searched_robot(problem, fitted);
+  const GroundRobot robot = searched_robot(problem.ground->robot(), fitted);
   if (!check_robot(robot)) return values;
   const GroundTable there(robot), here(problem.ground->robot());
   for (const Gene& gene : problem.genes) {
@@ -145,7 +140,7 @@ ParameterValues without_slip(const Problem& problem, ParameterValues values) {
 std::vector<bool> identified_by_kinematics(const Problem& problem) {
   Kinematics moved = nominal_kinematics(problem.ground->robot());
   for (double& value : moved.values) value += 1e-3 * (1 + std::abs(value));
-  const GroundTable there(searched_robot(problem, moved));
+  const GroundTable there(searched_robot(problem.ground->robot(), moved));
   const GroundTable here(problem.ground->robot());
   std::vector<bool> identified;
   for (const Gene& gene : problem.genes) {

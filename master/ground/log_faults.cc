@@ -179,6 +179,8 @@ double own_values_shrink(const WindowFitter& fitter, const GroundSearch& search,
     others[static_cast<std::size_t>(windows.block[i])] = 0;
     count += 1;
   }
+  // Few windows are fitted by values of their own whatever they are.
+  if (count < static_cast<double>(kEnoughToScatter) * windows.lengths) return 1;
   std::vector<FitRow> rows = search.free_fit.rows;
   // How a run's clock stands is a caution of its own.
   for (FitRow& row : rows) {

@@ -150,7 +150,7 @@ TEST(ReportHtml, ParametersHaveIntervalsBoundsAndWhatMakesUpForWhat) {
 TEST(ReportHtml, WithoutParametersItNamesTheReason) {
   Diagnosis diagnosis = example_diagnosis();
   diagnosis.parameters.clear();
-  EXPECT_THAT(report_html(diagnosis), HasSubstr("None: nothing was named"));
+  EXPECT_THAT(report_html(diagnosis), HasSubstr("None of a config: nothing was named"));
 }
 
 TEST(Parameters, AZeroThatEndsASizeIsNoBound) {
