@@ -394,7 +394,8 @@ Result<FittedRuns> open_fitted(const std::string& source, const std::vector<std:
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(source));
   ASSIGN_OR_RETURN(auto problem, stored_problem(reader));
   ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
-  return FittedRuns{problem, model.values, {}, folders.empty() ? model.data.files : folders};
+  ASSIGN_OR_RETURN(const auto config, parse_stored(reader.info(), problem));
+  return FittedRuns{problem, model.values, {}, folders.empty() ? config.trial_files : folders};
 }
 
 }  // namespace gapfarm

@@ -150,7 +150,9 @@ TEST_F(GroundCommands, ARunAndADiagnosisGoOnFromAnyFolder) {
       "\"$G\" diagnose car.toml --out found --workers 1");
   ASSERT_EQ(begun.exit_code, 0) << begun.err;
   const Finished resumed = shell(
-      "cd elsewhere && \"$G\" resume ../run --generations 2 --workers 1 && "
+      "cd elsewhere && \"$G\" export ros ../run --out ros && \"$G\" export runs ../run --out first "
+      "&& "
+      "\"$G\" resume ../run --generations 2 --workers 1 && "
       "\"$G\" export runs ../run --out paths && \"$G\" export ranges ../found --out ranges");
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(status("run")["generation"], 2);

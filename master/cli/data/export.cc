@@ -105,7 +105,8 @@ Result<GroundSource> read_ground_source(const std::string& source, Console& cons
   ASSIGN_OR_RETURN(const auto problem, stored_problem(*reader));
   RETURN_IF_ERROR(check_ground(problem, source));
   ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
-  return GroundSource{problem.ground->robot(), model.data.files,
+  ASSIGN_OR_RETURN(const auto config, parse_stored(reader->info(), problem));
+  return GroundSource{problem.ground->robot(), config.trial_files,
                       simulated_friction(problem, model)};
 }
 
