@@ -263,7 +263,8 @@ std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
   page.heading("Values over runs");
   page.paragraph(
       "Each run's value with its 90 % interval, all other values as the robot's own. An interval "
-      "holds what differs from run to run; how unsure the robot's own values are (watch.json: error) "
+      "holds what differs from run to run; how unsure the robot's own values are (watch.json: "
+      "error) "
       "moves all its runs alike and is not in it.");
   // What changed first.
   std::vector<std::size_t> order = mapped(changes.steps, &ValueStep::value);
