@@ -385,8 +385,7 @@ void report_to(Console& console, SocketFarmOptions& options) {
 
 Result<FittedRuns> open_fitted(const std::string& source, const std::vector<std::string>& folders,
                                Console& console) {
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(source, ignored)) {
+  if (std::error_code ignored; !std::filesystem::is_directory(source, ignored)) {
     ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {.files = folders, .read = {}}));
     return FittedRuns{config.problem, config.problem.values, config.windows, config.trial_files,
                       config.robot_path};
