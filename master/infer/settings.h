@@ -68,7 +68,7 @@ inline constexpr double kSureGain = 2;
 // s.e. | round | The same for a gain to be considered at all: a few observations carry it
 // otherwise. Against chance guards the least gain.
 inline constexpr double kLeastSure = 1;
-// effects | chosen: a stranger's robot with four values wrong | That are named of one log.
+// effects | chosen: a robot of which four values were wrong | That are named of one log.
 inline constexpr std::size_t kMostNames = 4;
 // parts of a log | cited: five to ten are customary (Hastie, Tibshirani and Friedman 2009, 7.10) |
 // That are held out in turn.
