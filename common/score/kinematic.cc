@@ -86,7 +86,9 @@ GroundRobot searched_robot(const GroundRobot& given, const Kinematics& kinematic
   GroundRobot robot = robot_with(given, kinematics);
   const double times = robot.friction_ratio / given.friction_ratio;
   robot.friction_ratio = given.friction_ratio;
-  for (RobotWheel& w : robot.wheels) *w.x_m *= times;
+  for (RobotWheel& w : robot.wheels) {
+    if (w.kind != WheelKind::kCaster) *w.x_m *= times;
+  }
   if (robot.controller.wheelbase_m) *robot.controller.wheelbase_m *= times;
   return robot;
 }

@@ -142,6 +142,7 @@ KinematicBody::KinematicBody(const GroundRobot& robot, const Kinematics& at)
 std::optional<double> skid_friction_ratio(const GroundRobot& robot, double separation_ratio) {
   double half = 0, front = 0, rear = 0;
   for (const RobotWheel& w : robot.wheels) {
+    if (w.kind == WheelKind::kCaster) continue;
     half = std::max(half, std::abs(*w.y_m));
     front = std::max(front, *w.x_m);
     rear = std::min(rear, *w.x_m);
