@@ -135,6 +135,19 @@ double side_radius_m(const GroundRobot& robot, std::string_view side) {
   return w == nullptr ? 0 : *w->radius_m;
 }
 
+std::optional<double> turning_separation_m(const GroundRobot& robot) {
+  const ControllerKinematics& k = robot.controller;
+  if (robot.effective_separation_m || !k.wheel_separation_m) return robot.effective_separation_m;
+  return *k.wheel_separation_m * k.wheel_separation_multiplier;
+}
+
+double turning_multiplier(const GroundRobot& robot) {
+  const ControllerKinematics& k = robot.controller;
+  const auto& across = robot.effective_separation_m;
+  return across && k.wheel_separation_m ? *across / *k.wheel_separation_m
+                                        : k.wheel_separation_multiplier;
+}
+
 double wheel_reach_m(const GroundRobot& robot) {
   double farthest = 0;
   for (const RobotWheel& w : robot.wheels) {

@@ -125,6 +125,9 @@ struct GroundRobot {
   double roller_drag = 0.02;      // omni, mecanum: friction across over along
   double caster_drag = 0;         // friction of a caster over that of a wheel
   ControllerKinematics controller;
+  // How far apart wheels that never slip would stand to turn as this robot does (its effective
+  // track width); none: as far as its controller believes.
+  std::optional<double> effective_separation_m;
   RobotMotors motors;
   RobotThrottle throttle;
   RobotSteering steering;
@@ -160,6 +163,11 @@ inline bool is_throttled(const GroundRobot& robot) {
 const RobotWheel* driven_wheel(const GroundRobot& robot, std::optional<WheelSide> side = {});
 // That wheel's radius, of "left" or "right"; 0: there is none.
 double side_radius_m(const GroundRobot& robot, std::string_view side);
+// How far apart the robot's wheels turn, once what slips is taken as standing wider: as stated, or
+// by its controller's separation and multiplier; none: neither is known.
+std::optional<double> turning_separation_m(const GroundRobot& robot);
+// That over the wheel_separation: the multiplier of a controller that turns the robot as asked.
+double turning_multiplier(const GroundRobot& robot);
 // How far the farthest wheel stands from the origin; 0 where no place is known.
 double wheel_reach_m(const GroundRobot& robot);
 // The one of these names of channels that is the wheel's: its own name, or its side.

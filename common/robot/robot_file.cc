@@ -33,6 +33,7 @@ void top_rows(Visitor& v, Robot& robot) {
   v.read("wheel_separation_multiplier", k.wheel_separation_multiplier, 0.01, 100);
   v.read("left_wheel_radius_multiplier", k.left_wheel_radius_multiplier, 0.01, 100);
   v.read("right_wheel_radius_multiplier", k.right_wheel_radius_multiplier, 0.01, 100);
+  v.read("effective_separation", robot.effective_separation_m, 1e-3, 500, "m");
   v.read("wheelbase", k.wheelbase_m, 1e-3, 50, "m");
   v.read("traction_track_width", k.traction_track_width_m, 1e-3, 50, "m");
   v.read("steering_track_width", k.steering_track_width_m, 1e-3, 50, "m");

@@ -135,8 +135,8 @@ KinematicBody::KinematicBody(const GroundRobot& robot, const Kinematics& at)
     inverse_ = omni_->inverse(tractions_);
   }
   separation_ratio_ = separation_;
-  const auto& k = robot_.controller;
-  separation_ *= k.wheel_separation_m.value_or(1) * k.wheel_separation_multiplier;
+  separation_ *=
+      turning_separation_m(robot_).value_or(robot_.controller.wheel_separation_multiplier);
 }
 
 std::optional<double> skid_friction_ratio(const GroundRobot& robot, double separation_ratio) {
@@ -148,24 +148,18 @@ std::optional<double> skid_friction_ratio(const GroundRobot& robot, double separ
     rear = std::min(rear, *w.x_m);
   }
   if (robot.drive != DriveKind::kSkid || !(front > rear) || half == 0) return std::nullopt;
-  const ControllerKinematics& k = robot.controller;
-  const double rolls =
-      separation_ratio * k.wheel_separation_m.value_or(2 * half) * k.wheel_separation_multiplier;
+  const double rolls = separation_ratio * turning_separation_m(robot).value_or(2 * half);
   return std::sqrt(std::max(rolls / (2 * half) - 1, 1e-3)) * 2 * half / (front - rear);
 }
 
 GroundRobot KinematicBody::corrected() const {
   GroundRobot robot = robot_;
-  ControllerKinematics& k = robot.controller;
-  double across = 1;
-  if (!skids(robot)) {
-    across = separation_ratio_;
-    if (k.wheel_separation_m) *k.wheel_separation_m *= across;
-  } else if (separation_ratio_ != 1) {
+  if (skids(robot) && separation_ratio_ != 1) {
     robot.friction_ratio =
         skid_friction_ratio(robot, separation_ratio_).value_or(robot.friction_ratio);
-    k.wheel_separation_multiplier *= separation_ratio_;
   }
+  turn_by_separation(&robot);
+  const double across = skids(robot) ? 1 : separation_ratio_;
   if (grip_m_s2_) robot.friction = *grip_m_s2_ / kGravity_m_s2 / robot.friction_ratio;
   for (RobotWheel& w : robot.wheels) {
     if (w.kind == WheelKind::kCaster) continue;
@@ -360,6 +354,19 @@ Twist KinematicBody::on_floor(double v, double curvature) const {
   const double power = std::exp(grip_shape_ * std::log(std::abs(asked)));
   const double held = std::exp(-std::log1p(power) / grip_shape_);
   return {v, -slip_angle_rad_ * v * asked * held, v * curvature * held};
+}
+
+// Twists were sent by a controller that goes on believing what it does.
+void KinematicBody::turn_by_separation(GroundRobot* robot) const {
+  if (separation_ratio_ == 1) return;
+  ControllerKinematics& k = robot->controller;
+  if (robot->effective_separation_m || robot->command == CommandKind::kTwist) {
+    robot->effective_separation_m = separation_;
+  } else if (skids(*robot)) {
+    k.wheel_separation_multiplier *= separation_ratio_;
+  } else if (k.wheel_separation_m) {
+    *k.wheel_separation_m *= separation_ratio_;
+  }
 }
 
 void KinematicBody::correct_arms(GroundRobot* robot) const {

@@ -91,8 +91,8 @@ class OmniWheels {
 
 // By four-point Coulomb theory a skid-steer turns as wheels do that stand
 // 1 + (friction_ratio wheelbase / wheel_separation)^2 as far apart as its own: the friction ratio
-// of which that is what its controller's separation and multiplier come to, times
-// `separation_ratio`. None of other drives and of wheels in one line.
+// of which that is its turning_separation_m() times `separation_ratio`. None of other drives and of
+// wheels in one line.
 std::optional<double> skid_friction_ratio(const GroundRobot& robot, double separation_ratio);
 
 // The robot and the gains of its motion at some values.
@@ -137,6 +137,7 @@ class KinematicBody {
   void add_offsets(std::vector<double>* command) const;
   // A wheel of radius r at x, y drives ahead by r, aside by r / tan(roller angle), and turns the
   // robot by r / (y + x tan(roller angle)), or by r / robot_radius where wheels stand across.
+  void turn_by_separation(GroundRobot* robot) const;
   void correct_arms(GroundRobot* robot) const;
 
   GroundRobot robot_;

@@ -29,7 +29,7 @@ std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Est
     return ratio("wheels." + row.name + ".radius", side_radius_m(robot, row.name), " m");
   }
   if (row.name == "separation" && k.wheel_separation_m) {
-    const double own = k.wheel_separation_multiplier;
+    const double own = turning_multiplier(robot);
     if (own != 1 || skids(robot)) {
       return ratio("wheel_separation_multiplier", own, "");
     }
@@ -62,8 +62,7 @@ std::string share_text(double value, double lo, double hi) {
 double own_value(const GroundRobot& robot, const KinematicRow& row) {
   if (row.name == "traction") return 1;
   if (row.name == "separation") {
-    const ControllerKinematics& k = robot.controller;
-    return skids(robot) ? k.wheel_separation_multiplier : k.wheel_separation_m.value_or(0);
+    return skids(robot) ? turning_multiplier(robot) : turning_separation_m(robot).value_or(0);
   }
   return side_radius_m(robot, row.name);
 }
@@ -310,8 +309,7 @@ std::vector<std::string> cautions_of(const GroundRobot& robot, const GroundSearc
   return cautions;
 }
 
-std::string what_to_do(const GroundRobot& robot, const GroundSearch& search,
-                       const Diagnosis& diagnosis) {
+std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
   if (!search.faults.empty()) return search.catalogue[search.faults[0].hypothesis].remedy;
   if (diagnosis.effects.empty()) {
     if (diagnosis.verdict == Verdict::kNone) {
@@ -322,12 +320,8 @@ std::string what_to_do(const GroundRobot& robot, const GroundSearch& search,
   }
   if (search.reference) return "Put right what changed, or fit the robot anew from then on.";
   if (search.windows.simulated) return "Give these values to the program.";
-  // A log remembers the controller that drove it.
-  const bool driven = robot.command == CommandKind::kTwist;
-  return std::string(
-             "Take robot.toml beside this, which has these values, or gapfarm export ros for your "
-             "controller") +
-         (driven ? ", for logs to come: this one was driven by the controller of your file." : ".");
+  return "Take robot.toml beside this, which has these values, or gapfarm export ros for your "
+         "controller.";
 }
 
 }  // namespace gapfarm

@@ -32,8 +32,7 @@ void put_size(const GroundRobot& robot, ValueRange* range) {
     range->factor = side_radius_m(robot, range->kinematic);
   } else if (range->kinematic == "separation") {
     range->name = "wheel_separation";
-    range->factor =
-        *robot.controller.wheel_separation_m * robot.controller.wheel_separation_multiplier;
+    range->factor = *turning_separation_m(robot);
   } else {
     return;
   }

@@ -19,12 +19,15 @@ namespace {
 
 const double kWidestGrip = std::log(10.0);  // of a 90 % interval, beyond which it says nothing
 
-// A product of ratios that are 1 in the robot's file, times what the file has.
+// A product of ratios that are 1 in the robot's file, times what the file has: that is not what the
+// controller `had`, where the file knows better how the robot turns.
 ReportedValue product(const ReportedValues& reported, const std::string& key, double had,
                       std::initializer_list<const char*> over,
-                      std::initializer_list<const char*> under = {}) {
-  ReportedValue row{key, had, had, {had, had}, false};
-  double least = had, most = had;
+                      std::initializer_list<const char*> under = {},
+                      std::optional<double> known = {}) {
+  const double file = known.value_or(had);
+  ReportedValue row{key, had, file, {file, file}, file != had};
+  double least = file, most = file;
   const auto take = [&](const char* name, bool divide) {
     const ReportedValue* v = find_by(reported.values, name, &ReportedValue::name);
     if (v == nullptr || !v->named || v->reported <= 0 || v->interval.lower <= 0) return;
@@ -92,7 +95,7 @@ std::vector<ReportedValue> ros_values(const ReportedValues& reported) {
     return rows;
   }
   return {product(reported, "wheel_separation_multiplier", k.wheel_separation_multiplier,
-                  {"separation"}),
+                  {"separation"}, {}, turning_multiplier(robot)),
           product(reported, "left_wheel_radius_multiplier", k.left_wheel_radius_multiplier,
                   {"travel", "left"}),
           product(reported, "right_wheel_radius_multiplier", k.right_wheel_radius_multiplier,
@@ -108,9 +111,13 @@ std::vector<ReportedValue> robot_sizes(const ReportedValues& reported) {
     rows.push_back(product(reported, "wheels." + name + ".radius", *wheel->radius_m,
                            {"travel", name.c_str()}));
   }
-  // A skid-steer's wheels stand where they stand: its multiplier is another.
-  const auto& separation = reported.given.controller.wheel_separation_m;
-  if (separation && !skids(reported.given)) {
+  // A skid-steer's wheels stand where they stand, and a controller believes what it does.
+  const GroundRobot& given = reported.given;
+  const auto& separation = given.controller.wheel_separation_m;
+  if (separation && (given.effective_separation_m || given.command == CommandKind::kTwist)) {
+    rows.push_back(
+        product(reported, "effective_separation", *turning_separation_m(given), {"separation"}));
+  } else if (separation && !skids(given)) {
     rows.push_back(product(reported, "wheel_separation", *separation, {"separation"}));
   }
   for (const auto& [key, name] : {std::pair{"marker.x", "marker_x"},

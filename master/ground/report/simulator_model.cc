@@ -47,8 +47,7 @@ struct TwoWheels {
     const RobotWheel* left = driven_wheel(robot, WheelSide::kLeft);
     radius[0] = *left->radius_m;
     radius[1] = *driven_wheel(robot, WheelSide::kRight)->radius_m;
-    const ControllerKinematics& k = robot.controller;
-    separation = *k.wheel_separation_m * k.wheel_separation_multiplier;
+    separation = *turning_separation_m(robot);
     width = left->width_m.value_or(0.4 * radius[0]);
     mass = robot.mass_kg.value_or(kUnknownMass_kg);
     const double size = robot.body_length_m.value_or(1.2 * separation);

@@ -321,18 +321,46 @@ TEST(DiagnoseGround, AClockThatIsSlowIsNoSmallerWheel) {
   expect_size(found.effects.front(), "rate", 0.005);
 }
 
+// Wheels of 0.05 m, by a controller that believes in this separation.
+RunLog as_twists(RunLog log, double believed_m) {
+  log.channels = {"v", "omega"};
+  for (LoggedRun& run : log.runs) {
+    for (CommandRow& row : run.commands) {
+      const double left = 0.05 * row.values[0], right = 0.05 * row.values[1];
+      row.values = {(left + right) / 2, (right - left) / believed_m};
+    }
+  }
+  return log;
+}
+
+// The controller that drove a log goes on believing what it did then: the file with what was named
+// put in explains that log, and is no other than itself when asked again.
+TEST(DiagnoseGround, ACorrectedFileExplainsTheTwistsThatDroveTheLog) {
+  for (const char* drive : {"differential", "skid"}) {
+    const std::string file = std::string("drive = \"") + drive +
+                             "\"\nwheel_separation = 0.36\nwheel_radius = 0.05\nlag = 0.1\n"
+                             "commands = [\"v\", \"omega\"]\n"
+                             "[marker]\nx = 0.02\ny = 0.01\n";
+    const GroundRobot robot = robot_of(file.c_str());
+    const RunLog log = as_twists(driven(robot_of(kDifferential), {}), 0.36);
+    const GroundDiagnosis found = diagnosis_of(robot, log);
+    ASSERT_EQ(found.diagnosis.effects.size(), 1u) << found.diagnosis.headline;
+    EXPECT_EQ(found.diagnosis.effects[0].name, "wheel_separation");
+    EXPECT_EQ(found.corrected.controller.wheel_separation_m, 0.36);
+    EXPECT_NEAR(*found.corrected.effective_separation_m, 0.3, 0.001) << drive;
+    const auto read = parse_robot(format_robot(found.corrected), "robot.toml");
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    const GroundDiagnosis again = diagnosis_of(*read, log);
+    EXPECT_EQ(found.diagnosis.verdict, Verdict::kEffect) << drive << found.diagnosis.headline;
+    EXPECT_EQ(again.diagnosis.verdict, Verdict::kNone) << drive << again.diagnosis.headline;
+  }
+}
+
 TEST(DiagnoseGround, FindsTheUnitOfCommandedTwists) {
   const GroundRobot robot = robot_of(
       "drive = \"differential\"\nwheel_separation = 0.3\n"
       "commands = [\"v\", \"omega\"]\n");
-  RunLog right = driven(robot_of(kDifferential), {});
-  right.channels = robot.channels;
-  for (LoggedRun& run : right.runs) {
-    for (CommandRow& row : run.commands) {
-      const double left = 0.05 * row.values[0], other = 0.05 * row.values[1];
-      row.values = {(left + other) / 2, (other - left) / 0.3};
-    }
-  }
+  const RunLog right = as_twists(driven(robot_of(kDifferential), {}), 0.3);
   EXPECT_TRUE(check_ground_log(robot, right).empty());
   const std::tuple<std::size_t, double, const char*> cases[] = {
       {0, 3.6, "km/h"}, {0, 1000, "mm/s"}, {1, 180 / std::numbers::pi, "degrees a second"}};
