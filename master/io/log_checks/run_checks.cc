@@ -143,10 +143,12 @@ std::vector<double> usual_times(const LoggedRun& run) {
 
 struct Jumps {
   std::vector<Step> steps;
-  double usual = 0;  // what no other step is longer than
+  std::vector<Step> lone;  // of these, to a pose that the next step leads back from
+  double usual = 0;        // what no other step is longer than
 };
 
-// Steps that are far longer than most, and than those about them.
+// Steps that are far longer than most, and than those about them; of two there and back a few times
+// as long are.
 Jumps jumps_of(const RunLog& log, double least, double most, const Length& length) {
   std::vector<Step> steps;
   std::vector<double> all;
@@ -163,16 +165,28 @@ Jumps jumps_of(const RunLog& log, double least, double most, const Length& lengt
   const auto limit = [&](double about) {
     return std::min(kTimesUsualStep * about, std::max(most, kTimesAStep * about));
   };
-  jumps.usual = std::max(least, limit(quantile(all, kUsualShare)));
+  const double most_are = quantile(all, kUsualShare);
+  jumps.usual = std::max(least, limit(most_are));
+  const auto returns = [&](const Step& there, const Step& back, double about) {
+    const double shorter = std::min(there.length, back.length);
+    if (there.run != back.run || shorter < std::max(least, kTimesAStep * about)) return false;
+    const std::vector<PoseRow>& poses = log.runs[there.run].poses;
+    return length(poses[there.to - 1].X_WM, poses[back.to].X_WM) < shorter / 2;
+  };
   for (std::size_t k = 0; k < steps.size(); ++k) {
-    if (!(steps[k].length > jumps.usual)) continue;
+    if (!(steps[k].length > std::max(least, kTimesAStep * most_are))) continue;
     std::vector<double> about;
     const std::size_t end = std::min(steps.size(), k + kNeighbours + 1);
     for (std::size_t j = k - std::min(k, kNeighbours); j < end; ++j) {
       if (j != k && steps[j].run == steps[k].run) about.push_back(steps[j].length);
     }
-    if (about.empty() || !(steps[k].length > limit(median(about)))) continue;
-    jumps.steps.push_back(steps[k]);
+    if (about.empty()) continue;
+    const double near = std::max(most_are, median(about));
+    const bool there = k + 1 < steps.size() && returns(steps[k], steps[k + 1], near);
+    const bool back = k > 0 && returns(steps[k - 1], steps[k], near);
+    const bool far = steps[k].length > jumps.usual && steps[k].length > limit(median(about));
+    if (there) jumps.lone.push_back(steps[k]);
+    if (there || back || far) jumps.steps.push_back(steps[k]);
   }
   return jumps;
 }
@@ -223,6 +237,7 @@ std::vector<std::size_t> lost_poses(const LoggedRun& run, std::size_t start, int
 }
 
 void omit_jumps(const RunLog& log, const Jumps& jumps, const Length& length, RunChecks* checks) {
+  for (const Step& step : jumps.lone) checks->false_poses.insert({step.run, step.to});
   for (std::size_t r = 0; r < log.runs.size(); ++r) {
     std::vector<std::size_t> cuts;
     for (const Step& step : jumps.steps) {

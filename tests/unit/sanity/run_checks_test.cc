@@ -122,6 +122,23 @@ TEST(RunChecks, HeadingsThatFlipAreOmitted) {
   EXPECT_EQ(checks.false_poses, flipped);
 }
 
+// A few times as far as the robot comes from pose to pose is no speed of its where it is back at
+// once; a robot that turns round gets nowhere near.
+TEST(RunChecks, APoseThatTheRobotIsBackFromAtOnceIsOmitted) {
+  for (const bool turned : {false, true}) {
+    RunLog log = two_runs();
+    FalsePoses lone;
+    for (const std::size_t i : {40, 71, 133, 220}) {
+      Pose& X = log.runs[1].poses[i].X_WM;
+      X = turned ? Pose{X.x, X.y, wrap_angle(X.theta + 1)} : Pose{X.x, X.y + 0.3, X.theta};
+      lone.insert({1, i});
+    }
+    const RunChecks checks = check_jumps(log);
+    EXPECT_EQ(names_of(checks), std::vector<std::string>{turned ? "heading_jumps" : "pose_jumps"});
+    EXPECT_EQ(checks.false_poses, lone);
+  }
+}
+
 TEST(RunChecks, AfterALastingJumpTheRunGoesOn) {
   RunLog log = two_runs();
   for (std::size_t i = 180; i < 300; ++i) log.runs[0].poses[i].X_WM.x += 2;
