@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "master/ground/catalogue.h"
 #include "master/ground/fit/scans.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/tolerances.h"
@@ -26,160 +25,179 @@ void only_more(GroundHypothesis& hypothesis) {
   hypothesis.propose = from_scan(scan_size);
 }
 
-}  // namespace
+// Of a robot's file, or of what may change from one log to another.
+class Catalogue {
+ public:
+  Catalogue(const GroundRobot& robot, const std::vector<KinematicRow>& rows, bool changes)
+      : all(wrong_log(robot)), robot_(robot), rows_(rows) {
+    if (changes) floors();
+    sizes();
+    if (!changes) all_sizes();
+    steering();
+    motors();
+    marker();
+    if (!changes) tracker();
+    // Where on the floor, and which way.
+    all.push_back(floor_edge());
+    all.push_back(friction_patch());
+    all.push_back(floor_tilt());
+  }
 
-void Catalogue::sizes() {
-  const double share = skids(robot_) ? kSkidRadiusShare : kRadiusShare;
-  if (is_throttled(robot_)) return;
-  if (is_holonomic(robot_)) {
+  std::vector<GroundHypothesis> all;  // simple ones first
+
+ private:
+  const KinematicRow& row(const std::string& name) const {
+    return *std::ranges::find(rows_, name, &KinematicRow::name);
+  }
+  GroundHypothesis& value(const std::string& name, std::vector<std::string> aliases,
+                          const std::string& thing, std::vector<KinematicRow> freed) {
+    all.push_back({name, std::move(aliases), thing, std::move(freed)});
+    return all.back();
+  }
+
+  void sizes() {
+    const double share = skids(robot_) ? kSkidRadiusShare : kRadiusShare;
+    if (is_throttled(robot_)) return;
+    if (is_holonomic(robot_)) {
+      value("wheel_radius", {"speed_gain"}, "the radius of all wheels",
+            {{"travel", 1, share, "ratio", "-"}});
+      value("wheel_slip", {"floor", "roller_drag"}, "how far the robot goes of its wheels' way",
+            {row("traction")});
+      value("com_offset", {"payload"}, "where the weight stands on the wheels",
+            {row("load_x"), row("load_y")});
+      value("ahead_gain", {"roller_drag", "speed_gain"}, "travel ahead", {row("ahead")});
+      value("aside_gain", {"roller_drag"}, "travel aside", {row("aside")});
+      value("wheel_separation", {"robot_radius", "turn_gain"},
+            "how far the wheels stand from the middle",
+            {{"arm", 1, row("turn").tolerance, "ratio", "-"}});
+      return;
+    }
+    if (is_steered(robot_)) {
+      value("wheel_radius", {"speed_gain"}, "the radius of the driving wheel", {row("ahead")});
+      return;
+    }
+    value("wheel_radius", {"motor_asymmetry"}, "the radius of the right wheels", {row("right")});
+    value("wheel_radius", {"motor_asymmetry"}, "the radius of the left wheels", {row("left")});
     value("wheel_radius", {"speed_gain"}, "the radius of all wheels",
           {{"travel", 1, share, "ratio", "-"}});
-    value("wheel_slip", {"floor", "roller_drag"}, "how far the robot goes of its wheels' way",
-          {row("traction")});
-    value("com_offset", {"payload"}, "where the weight stands on the wheels",
-          {row("load_x"), row("load_y")});
-    value("ahead_gain", {"roller_drag", "speed_gain"}, "travel ahead", {row("ahead")});
-    value("aside_gain", {"roller_drag"}, "travel aside", {row("aside")});
-    value("wheel_separation", {"robot_radius", "turn_gain"},
-          "how far the wheels stand from the middle",
-          {{"arm", 1, row("turn").tolerance, "ratio", "-"}});
-    return;
+    value("wheel_separation", {"icr_track", "friction_anisotropy"},
+          "the distance between the sides, as they roll", {row("separation")});
   }
-  if (is_steered(robot_)) {
-    value("wheel_radius", {"speed_gain"}, "the radius of the driving wheel", {row("ahead")});
-    return;
+
+  // A file that was made with a ruler is off in all of them; no robot changes so.
+  void all_sizes() {
+    if (is_throttled(robot_) || is_holonomic(robot_) || is_steered(robot_)) return;
+    KinematicRow left = row("left"), right = row("right"), apart = row("separation");
+    left.key = "left", right.key = "right", apart.key = "separation";
+    value("wheel_radius", {"wheel_separation", "motor_asymmetry"}, "the size of the robot",
+          {left, right, apart});
   }
-  value("wheel_radius", {"motor_asymmetry"}, "the radius of the right wheels", {row("right")});
-  value("wheel_radius", {"motor_asymmetry"}, "the radius of the left wheels", {row("left")});
-  value("wheel_radius", {"speed_gain"}, "the radius of all wheels",
-        {{"travel", 1, share, "ratio", "-"}});
-  value("wheel_separation", {"icr_track", "friction_anisotropy"},
-        "the distance between the sides, as they roll", {row("separation")});
-}
 
-// A file that was made with a ruler is off in all of them; no robot changes so.
-void Catalogue::all_sizes() {
-  if (is_throttled(robot_) || is_holonomic(robot_) || is_steered(robot_)) return;
-  KinematicRow left = row("left"), right = row("right"), apart = row("separation");
-  left.key = "left", right.key = "right", apart.key = "separation";
-  value("wheel_radius", {"wheel_separation", "motor_asymmetry"}, "the size of the robot",
-        {left, right, apart});
-}
-
-void Catalogue::steering() {
-  if (!is_steered(robot_)) return;
-  value("steering_offset", {}, "where the wheels point when commanded straight",
-        {row("steering_offset")});
-  value("steering_gain", {"wheelbase"}, "the angle that is steered over the commanded one",
-        {row("steering_gain")});
-  value("wheelbase", {"steering_gain"}, "the distance from the steered axle to the other",
-        {{"wheelbase", 1, kSteeringGainShare, "ratio", "-"}});
-  value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
-        {row("understeer")});
-  if (!robot_.steering.table.empty()) {
-    value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
-          {{"steering_left", 1, kSteeringGainShare, "ratio", "-"}});
-    value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the right",
-          {{"steering_right", 1, kSteeringGainShare, "ratio", "-"}});
+  void steering() {
+    if (!is_steered(robot_)) return;
+    value("steering_offset", {}, "where the wheels point when commanded straight",
+          {row("steering_offset")});
+    value("steering_gain", {"wheelbase"}, "the angle that is steered over the commanded one",
+          {row("steering_gain")});
+    value("wheelbase", {"steering_gain"}, "the distance from the steered axle to the other",
+          {{"wheelbase", 1, kSteeringGainShare, "ratio", "-"}});
+    value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
+          {row("understeer")});
+    if (!robot_.steering.table.empty()) {
+      value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
+            {{"steering_left", 1, kSteeringGainShare, "ratio", "-"}});
+      value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the right",
+            {{"steering_right", 1, kSteeringGainShare, "ratio", "-"}});
+    }
   }
-}
 
-void Catalogue::motors() {
-  value("command_delay", {"pose_latency", "clock_offset"}, "the time from a command to its pose",
-        {row("delay")})
-      .propose = from_scan(scan_delay);
-  value("clock_drift", {"clock_offset"}, "the rate of one clock against the other",
-        {{"drift", 0, 2e-5, "rate", "s/s"}});
-  value("clock_drift", {"clock_offset"}, "the rate of the robot's clock against the tracker's",
-        {{"rate", 0, 2e-5, "rate", "s/s"}});
-  only_more(value("battery_sag", {}, "what the drive loses a minute",
-                  {{"sag", 0, 0.005, "rate", "1/min"}}));
-  // Motors lie before what was measured, unless the file states them all the same.
-  if (!robot_.measured || robot_.motors.lag_s > 0) {
-    value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
-          is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
+  void motors() {
+    value("command_delay", {"pose_latency", "clock_offset"}, "the time from a command to its pose",
+          {row("delay")})
+        .propose = from_scan(scan_delay);
+    value("clock_drift", {"clock_offset"}, "the rate of one clock against the other",
+          {{"drift", 0, 2e-5, "rate", "s/s"}});
+    value("clock_drift", {"clock_offset"}, "the rate of the robot's clock against the tracker's",
+          {{"rate", 0, 2e-5, "rate", "s/s"}});
+    only_more(value("battery_sag", {}, "what the drive loses a minute",
+                    {{"sag", 0, 0.005, "rate", "1/min"}}));
+    // Motors lie before what was measured, unless the file states them all the same.
+    if (!robot_.measured || robot_.motors.lag_s > 0) {
+      value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
+            is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
+    }
+    if (is_throttled(robot_)) {
+      value("throttle_gain", {"payload", "battery_voltage"}, "the acceleration a unit of throttle",
+            {{"power", 1, kPowerShare, "ratio", "-"}});
+      value("throttle_zero", {"motor_deadband"}, "the throttle that moves nothing", {row("zero")});
+      value("rolling_resistance", {"drag"}, "the deceleration a m/s", {row("drag")});
+      return;
+    }
+    if (!robot_.measured) {
+      const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
+      only_more(value("motor_deadband", {}, "commands that move nothing",
+                      {{"dead_band", robot_.motors.dead_band, band, "width", "of the command"}}));
+    }
+    const auto& limit = robot_.motors.acceleration_limit_m_s2;
+    if (robot_.measured && !limit) return;
+    only_more(value("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
+                    {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m"}}));
   }
-  if (is_throttled(robot_)) {
-    value("throttle_gain", {"payload", "battery_voltage"}, "the acceleration a unit of throttle",
-          {{"power", 1, kPowerShare, "ratio", "-"}});
-    value("throttle_zero", {"motor_deadband"}, "the throttle that moves nothing", {row("zero")});
-    value("rolling_resistance", {"drag"}, "the deceleration a m/s", {row("drag")});
-    return;
+
+  void marker() {
+    value("marker_offset", {"com_offset"}, "the tracked point on the robot",
+          {row("marker_x"), row("marker_y")});
+    value("marker_yaw", {"heading_offset"}, "the heading of the tracked point",
+          {row("marker_yaw")});
   }
-  if (!robot_.measured) {
-    const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
-    only_more(value("motor_deadband", {}, "commands that move nothing",
-                    {{"dead_band", robot_.motors.dead_band, band, "width", "of the command"}}));
+
+  void tracker() {
+    // Of increments alone a robot that is smaller in all its sizes shows as much.
+    value("pose_scale", {"unit_error", "camera_scale"}, "the scale of all positions",
+          {{"pose_scale", 1, 0.01, "ratio", "-"}})
+        .of_world = true;
+    value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}})
+        .of_world = true;
   }
-  const auto& limit = robot_.motors.acceleration_limit_m_s2;
-  if (robot_.measured && !limit) return;
-  only_more(value("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
-                  {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m"}}));
-}
 
-void Catalogue::marker() {
-  value("marker_offset", {"com_offset"}, "the tracked point on the robot",
-        {row("marker_x"), row("marker_y")});
-  value("marker_yaw", {"heading_offset"}, "the heading of the tracked point", {row("marker_yaw")});
-}
-
-void Catalogue::tracker() {
-  // Of increments alone a robot that is smaller in all its sizes shows as much.
-  value("pose_scale", {"unit_error", "camera_scale"}, "the scale of all positions",
-        {{"pose_scale", 1, 0.01, "ratio", "-"}})
-      .of_world = true;
-  value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}})
-      .of_world = true;
-}
-
-// Where on the floor, and which way.
-void Catalogue::world() {
-  all.push_back(floor_edge());
-  all.push_back(friction_patch());
-  all.push_back(floor_tilt());
-}
-
-// What another floor or another load changes.
-void Catalogue::floors() {
-  const KinematicRow travel{"travel", 1, kSlipShare, "ratio", "-"};
-  const char* slips = "how far the wheels travel a turn";
-  if (is_steered(robot_)) {
-    value("friction", {"friction_anisotropy"}, "friction across the wheels",
-          {row("grip"), row("slip_angle"), row("grip_shape")})
-        .propose = from_scan(scan_grip);
-    if (!is_throttled(robot_))
-      value("floor", {"wheel_slip", "wheel_radius"}, slips, {row("ahead")});
-  } else if (skids(robot_)) {
-    value("friction_across", {"wheel_separation", "icr_track", "friction_anisotropy"},
-          "how hard the floor makes it to turn (the separation of the sides, as they roll)",
-          {row("separation")});
-    value("wheel_slip", {"wheel_radius", "speed_gain"}, slips, {travel});
-    value("floor", {"wheel_slip", "friction_across"},
-          "how the wheels slip:", {travel, row("separation")});
-    // Weight to one side or end moves the point that wheels skid about, and makes them hold more.
-    value("com_offset", {"payload", "marker_offset"},
-          "where the weight stands, by what the robot turns about:",
-          {row("marker_x"), row("marker_y"), row("separation")});
-  } else if (is_holonomic(robot_)) {
-    value("floor", {"wheel_slip", "roller_drag"}, "how far the robot goes of its wheels' way",
-          {row("traction")});
-  } else {
-    value("floor", {"wheel_slip", "wheel_radius"}, slips, {travel});
+  // What another floor or another load changes.
+  void floors() {
+    const KinematicRow travel{"travel", 1, kSlipShare, "ratio", "-"};
+    const char* slips = "how far the wheels travel a turn";
+    if (is_steered(robot_)) {
+      value("friction", {"friction_anisotropy"}, "friction across the wheels",
+            {row("grip"), row("slip_angle"), row("grip_shape")})
+          .propose = from_scan(scan_grip);
+      if (!is_throttled(robot_))
+        value("floor", {"wheel_slip", "wheel_radius"}, slips, {row("ahead")});
+    } else if (skids(robot_)) {
+      value("friction_across", {"wheel_separation", "icr_track", "friction_anisotropy"},
+            "how hard the floor makes it to turn (the separation of the sides, as they roll)",
+            {row("separation")});
+      value("wheel_slip", {"wheel_radius", "speed_gain"}, slips, {travel});
+      value("floor", {"wheel_slip", "friction_across"},
+            "how the wheels slip:", {travel, row("separation")});
+      // Weight to one side or end moves the point that wheels skid about, and makes them hold more.
+      value("com_offset", {"payload", "marker_offset"},
+            "where the weight stands, by what the robot turns about:",
+            {row("marker_x"), row("marker_y"), row("separation")});
+    } else if (is_holonomic(robot_)) {
+      value("floor", {"wheel_slip", "roller_drag"}, "how far the robot goes of its wheels' way",
+            {row("traction")});
+    } else {
+      value("floor", {"wheel_slip", "wheel_radius"}, slips, {travel});
+    }
   }
-}
+
+  const GroundRobot& robot_;
+  const std::vector<KinematicRow>& rows_;
+};
+
+}  // namespace
 
 std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
                                                 const std::vector<KinematicRow>& rows) {
-  Catalogue catalogue(robot, rows);
-  catalogue.wrong_commands();
-  catalogue.wrong_poses();
-  catalogue.wrong_increments();
-  catalogue.floors();
-  catalogue.sizes();
-  catalogue.steering();
-  catalogue.motors();
-  catalogue.marker();
-  catalogue.world();
+  Catalogue catalogue(robot, rows, true);
   // What turns or travels on another floor has the floor's name; without a turn, omni wheels that
   // are larger cannot be distinguished from rollers that drag less.
   if (is_holonomic(robot)) {
@@ -199,18 +217,7 @@ std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
 }
 
 std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
-  Catalogue catalogue(robot, kinematic_rows(robot));
-  catalogue.wrong_commands();
-  catalogue.wrong_poses();
-  catalogue.wrong_increments();
-  catalogue.sizes();
-  catalogue.all_sizes();
-  catalogue.steering();
-  catalogue.motors();
-  catalogue.marker();
-  catalogue.tracker();
-  catalogue.world();
-  return std::move(catalogue.all);
+  return Catalogue(robot, kinematic_rows(robot), false).all;
 }
 
 void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows) {

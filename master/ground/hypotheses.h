@@ -43,7 +43,7 @@ struct GroundHypothesis {
   std::function<void(RunLog*)> put_right = {};
   double metres = 1;  // logged positions times this are metres
   std::string remedy = {};
-  double price = 0;            // nats that it must gain more, having more values than others
+  double price = 0;            // nats that it must gain beyond those of its values
   bool of_world = false;       // acts in a place or along an axis of the world
   bool of_increments = false;  // of relative poses alone
   double radians = 1;          // logged headings times this are radians
@@ -69,6 +69,20 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot);
 
 // A row for the gyro's scale, where the log has one.
 void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows);
+
+// What a log may have the wrong way round or in another unit: all of it, of poses alone, and what
+// is wrong with commands as poses show it.
+std::vector<GroundHypothesis> wrong_log(const GroundRobot& robot);
+std::vector<GroundHypothesis> wrong_poses();
+std::vector<GroundHypothesis> wrong_sides_of_poses();
+
+// Two floors in one log: beyond an edge, or within a patch, a wheel travels less far, or farther
+// (common/score/kinematic_body.h).
+GroundHypothesis floor_edge();
+GroundHypothesis friction_patch();
+// A floor that is not level: the robot goes farther than its wheels downhill, and less far uphill;
+// a throttle is driven by its weight (common/score/kinematic.h).
+GroundHypothesis floor_tilt();
 
 // In the order in which equals are preferred: simple first.
 std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot);

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
 
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
-#include "master/ground/catalogue.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
 #include "master/infer/fit.h"
@@ -292,14 +292,12 @@ Result<std::optional<SanityFinding>> check_program_log(Farm& farm, const Problem
                                                        const WindowSettings& settings) {
   ProgramFarm program(farm, problem);
   const GroundRobot robot = robot_of(problem, program.X_RM());
-  Catalogue faults(robot, {});
-  faults.wrong_poses();
-  // Of commands, but seen as well without another run of the program.
-  faults.wrong_sides_of_poses();
-  std::erase_if(faults.all,
-                [](const GroundHypothesis& h) { return h.metres > kUntuned && h.metres < 1; });
   GroundQuestion question;
-  question.catalogue = std::move(faults.all);
+  question.catalogue = wrong_poses();
+  // Of commands, but seen as well without another run of the program.
+  std::ranges::move(wrong_sides_of_poses(), std::back_inserter(question.catalogue));
+  std::erase_if(question.catalogue,
+                [](const GroundHypothesis& h) { return h.metres > kUntuned && h.metres < 1; });
   ASSIGN_OR_RETURN(const auto logged, window_set(robot, log, settings));
   const std::vector<Pose> ends = program.simulation(logged)({Kinematics{}}).front();
   RETURN_IF_ERROR(program.failure());

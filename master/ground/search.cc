@@ -254,7 +254,8 @@ double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
                const WindowFit& with, const WindowFit& without) {
   const double gain =
       hypothesis.gain ? hypothesis.gain(fitter, with, without) : with.objective - without.objective;
-  return gain - hypothesis.price;
+  const double more_values = static_cast<double>(hypothesis.freed.size()) - 1;
+  return gain - (kPriceOfAValue * more_values + hypothesis.price);
 }
 
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,

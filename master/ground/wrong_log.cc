@@ -1,14 +1,16 @@
 // Logs that are the wrong way round, or in another unit.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <numbers>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "common/base/ranges.h"
-#include "master/ground/catalogue.h"
+#include "master/ground/hypotheses.h"
 
 namespace gapfarm {
 namespace {
@@ -16,6 +18,12 @@ namespace {
 using std::numbers::pi;
 
 using PutRight = std::function<void(RunLog*)>;
+using Faults = std::vector<GroundHypothesis>;
+
+GroundHypothesis fault(const std::string& name, std::vector<std::string> aliases,
+                       const std::string& thing, const std::string& remedy, PutRight put_right) {
+  return {name, std::move(aliases), thing, {}, std::move(put_right), 1, remedy};
+}
 
 constexpr double kMostTimes = 10'000;  // a run's clock may have been set in between
 
@@ -149,71 +157,74 @@ constexpr CommandUnit kCommandUnits[] = {
     {kTwists, "omega", "commanded turns", "degrees a second", pi / 180, "turn_gain"},
     {kTwists, "omega", "commanded turns", "rpm", 2 * pi / 60, "turn_gain"}};
 
-}  // namespace
-
-void Catalogue::wrong_commands() {
-  const auto pairs = channel_pairs(robot_);
+Faults wrong_commands(const GroundRobot& robot) {
+  Faults all;
+  const auto pairs = channel_pairs(robot);
+  const auto turned = [&](const char* name, const std::string& thing,
+                          std::function<void(std::vector<double>&)> turn) {
+    all.push_back(fault(name, {"command_sign"}, "the sign of " + thing,
+                        "Turn the sign of that column.", change_commands(std::move(turn))));
+  };
   if (!pairs.empty()) {
-    fault("sides_swapped", {}, "left and right of the commands",
-          "Swap the columns of the two sides.", swap_commands(pairs));
+    all.push_back(fault("sides_swapped", {}, "left and right of the commands",
+                        "Swap the columns of the two sides.", swap_commands(pairs)));
     for (const bool left : {true, false}) {
-      fault("side_reversed", {"command_sign"},
-            std::string("the sign of the ") + (left ? "left" : "right") + " side",
-            "Turn the sign of that column.", change_commands([pairs, left](std::vector<double>& v) {
-              for (const auto& [l, r] : pairs) v[left ? l : r] *= -1;
-            }));
+      turned("side_reversed", std::string("the ") + (left ? "left" : "right") + " side",
+             [pairs, left](std::vector<double>& v) {
+               for (const auto& [l, r] : pairs) v[left ? l : r] *= -1;
+             });
     }
   }
   // A robot of wheels that push it several ways has a column for each.
-  const bool one_a_wheel = is_holonomic(robot_) && robot_.command != kTwists;
-  for (std::size_t c = 0; c < robot_.channels.size(); ++c) {
-    const std::string& channel = robot_.channels[c];
-    if (one_a_wheel) {
-      fault("side_reversed", {"command_sign"}, "the sign of " + channel,
-            "Turn the sign of that column.",
-            change_commands([c](std::vector<double>& v) { v[c] *= -1; }));
-    }
-    for (std::size_t d = c + 1; d < robot_.channels.size(); ++d) {
+  const bool one_a_wheel = is_holonomic(robot) && robot.command != kTwists;
+  const auto turn_column = [&](const char* name, std::size_t c) {
+    turned(name, robot.channels[c], [c](std::vector<double>& v) { v[c] *= -1; });
+  };
+  for (std::size_t c = 0; c < robot.channels.size(); ++c) {
+    if (one_a_wheel) turn_column("side_reversed", c);
+    for (std::size_t d = c + 1; d < robot.channels.size(); ++d) {
       if (!one_a_wheel && !pairs.empty()) continue;
-      fault("channels_swapped", {"sides_swapped"},
-            channel + " and " + robot_.channels[d] + " of the commands", "Swap these two columns.",
-            swap_commands({{c, d}}));
+      all.push_back(fault("channels_swapped", {"sides_swapped"},
+                          robot.channels[c] + " and " + robot.channels[d] + " of the commands",
+                          "Swap these two columns.", swap_commands({{c, d}})));
     }
   }
-  fault("command_reversed", {"command_sign"}, "the sign of every command",
-        "Turn the sign of the commands.", change_commands([](std::vector<double>& v) {
-          for (double& value : v) value = -value;
-        }));
+  turned("command_reversed", "every command", [](std::vector<double>& v) {
+    for (double& value : v) value = -value;
+  });
+  all.back().remedy = "Turn the sign of the commands.";
   constexpr std::string_view kOfNoWheel[] = {"steering", "omega", "vy", "v", "speed", "throttle"};
-  for (std::size_t c = 0; c < robot_.channels.size(); ++c) {
-    const std::string& channel = robot_.channels[c];
+  for (std::size_t c = 0; c < robot.channels.size(); ++c) {
+    const std::string& channel = robot.channels[c];
     if (!contains(kOfNoWheel, channel)) continue;
     const bool turns = channel == "steering" || channel == "omega";
-    fault(turns ? "steering_reversed" : "command_reversed", {"command_sign"},
-          "the sign of " + channel, "Turn the sign of that column.",
-          change_commands([c](std::vector<double>& v) { v[c] *= -1; }));
+    turn_column(turns ? "steering_reversed" : "command_reversed", c);
   }
-  if (const auto& timeout_s = robot_.motors.command_timeout_s) {
-    fault("command_timeout", {"commands_on_change"},
-          "commands that hold until the next (their log keeps changes alone)",
-          "Give no cmd_vel_timeout with such a log.", hold_commands(*timeout_s));
+  if (const auto& timeout_s = robot.motors.command_timeout_s) {
+    all.push_back(fault("command_timeout", {"commands_on_change"},
+                        "commands that hold until the next (their log keeps changes alone)",
+                        "Give no cmd_vel_timeout with such a log.", hold_commands(*timeout_s)));
   }
-  const RobotWheel* wheel = driven_wheel(robot_);
-  for (const CommandUnit& unit : kCommandUnits) {
-    if (unit.of != robot_.command) continue;
-    if (unit.factor == kByRadius && (wheel == nullptr || !wheel->radius_m)) continue;
-    const double factor = unit.factor == kByRadius ? 1 / *wheel->radius_m : unit.factor;
-    const auto of_it = mapped(robot_.channels, [&](const std::string& channel) {
-      return channel.starts_with(unit.channel);
-    });
-    fault("unit_error", {"command_units", unit.alias},
-          std::string("the unit of the ") + unit.thing + ": " + unit.name,
-          "Multiply them by " + std::to_string(factor) + ".",
-          scale_commands(of_it, factor, unit.beyond));
-  }
+  return all;
 }
 
-namespace {
+Faults wrong_units_of_commands(const GroundRobot& robot) {
+  Faults all;
+  const RobotWheel* wheel = driven_wheel(robot);
+  for (const CommandUnit& unit : kCommandUnits) {
+    if (unit.of != robot.command) continue;
+    if (unit.factor == kByRadius && (wheel == nullptr || !wheel->radius_m)) continue;
+    const double factor = unit.factor == kByRadius ? 1 / *wheel->radius_m : unit.factor;
+    const auto of_it = mapped(robot.channels, [&](const std::string& channel) {
+      return channel.starts_with(unit.channel);
+    });
+    all.push_back(fault("unit_error", {"command_units", unit.alias},
+                        std::string("the unit of the ") + unit.thing + ": " + unit.name,
+                        "Multiply them by " + std::to_string(factor) + ".",
+                        scale_commands(of_it, factor, unit.beyond)));
+  }
+  return all;
+}
 
 // Poses that become right by L (x, y, theta), `turn` off the heading.
 struct WrongPoses {
@@ -256,42 +267,49 @@ constexpr std::pair<const char*, double> kLengths[] = {{"millimetres", 0.001},
 
 }  // namespace
 
-void Catalogue::wrong_poses() {
+std::vector<GroundHypothesis> wrong_poses() {
+  Faults all;
   for (const WrongPoses& w : kWrongPoses) {
     Eigen::Matrix3d L = Eigen::Vector3d(w.x, w.y, w.theta).asDiagonal();
     if (w.swaps) L.row(0).swap(L.row(1));
     std::vector<std::string> aliases = {w.alias, w.other};
     std::erase(aliases, "");
-    GroundHypothesis& h =
-        fault(w.name, std::move(aliases), w.thing, w.remedy, change_poses(L, w.turn));
-    h.of_world = w.of_world;
-    h.radians = std::abs(w.theta);
+    all.push_back(fault(w.name, std::move(aliases), w.thing, w.remedy, change_poses(L, w.turn)));
+    all.back().of_world = w.of_world;
+    all.back().radians = std::abs(w.theta);
   }
   for (const auto& [unit, metres] : kLengths) {
-    fault("unit_error", {"pose_units", "pose_scale"}, std::string("positions in ") + unit,
-          "Multiply x and y by " + std::to_string(metres) + ".",
-          change_poses(Eigen::Vector3d(metres, metres, 1).asDiagonal()))
-        .metres = metres;
+    all.push_back(fault("unit_error", {"pose_units", "pose_scale"},
+                        std::string("positions in ") + unit,
+                        "Multiply x and y by " + std::to_string(metres) + ".",
+                        change_poses(Eigen::Vector3d(metres, metres, 1).asDiagonal())));
+    all.back().metres = metres;
   }
+  return all;
 }
 
-// What is wrong with commands, as poses show it.
-void Catalogue::wrong_sides_of_poses() {
-  fault("sides_swapped", {"command_sign"}, "the side to which it turns",
-        "Exchange left and right in the commands, or mirror the poses.",
-        change_poses(Eigen::Vector3d(1, -1, -1).asDiagonal()));
-  fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
-        "Turn the sign of x.", change_poses(Eigen::Vector3d(-1, 1, 1).asDiagonal()));
+std::vector<GroundHypothesis> wrong_sides_of_poses() {
+  return {fault("sides_swapped", {"command_sign"}, "the side to which it turns",
+                "Exchange left and right in the commands, or mirror the poses.",
+                change_poses(Eigen::Vector3d(1, -1, -1).asDiagonal())),
+          fault("axes_mirrored", {"axes_swapped"}, "a world frame that is left-handed",
+                "Turn the sign of x.", change_poses(Eigen::Vector3d(-1, 1, 1).asDiagonal()))};
 }
 
-void Catalogue::wrong_increments() {
-  fault("increments_in_world", {"axes_turned"},
-        "the axes of the increments: they are the world's, not the robot's",
-        "Turn x and y of each increment by less the heading before it.",
-        change_increments([](const Pose& before, const Pose& X) {
-          return Pose{before.x + X.x, before.y + X.y, wrap_angle(before.theta + X.theta)};
-        }))
-      .of_increments = true;
+std::vector<GroundHypothesis> wrong_log(const GroundRobot& robot) {
+  Faults all = wrong_commands(robot);
+  for (Faults& more : std::array{wrong_units_of_commands(robot), wrong_poses()}) {
+    std::ranges::move(more, std::back_inserter(all));
+  }
+  all.push_back(
+      fault("increments_in_world", {"axes_turned"},
+            "the axes of the increments: they are the world's, not the robot's",
+            "Turn x and y of each increment by less the heading before it.",
+            change_increments([](const Pose& before, const Pose& X) {
+              return Pose{before.x + X.x, before.y + X.y, wrap_angle(before.theta + X.theta)};
+            })));
+  all.back().of_increments = true;
+  return all;
 }
 
 }  // namespace gapfarm

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "common/base/constants.h"
-#include "master/ground/catalogue.h"
 #include "master/ground/fit/held_out.h"
+#include "master/ground/hypotheses.h"
 #include "master/ground/tolerances.h"
 #include "master/infer/settings.h"
 
@@ -308,7 +308,7 @@ GroundHypothesis region(const char* name, const char* alias, const char* thing,
   hypothesis.name = name;
   hypothesis.aliases = {alias};
   hypothesis.thing = thing;
-  hypothesis.price = kPriceOfAValue * (static_cast<double>(freed.size()) - 1) + kPriceOfLooking;
+  hypothesis.price = kPriceOfLooking;
   hypothesis.freed = std::move(freed);
   hypothesis.of_world = true;
   hypothesis.kept = kKeptFloorShare;

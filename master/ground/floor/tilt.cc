@@ -6,8 +6,8 @@
 
 #include "common/base/constants.h"
 #include "common/pose/pose.h"
-#include "master/ground/catalogue.h"
 #include "master/ground/fit/held_out.h"
+#include "master/ground/hypotheses.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -58,7 +58,6 @@ GroundHypothesis floor_tilt() {
   tilt.thing = "the floor's slope";
   tilt.freed = {{"downhill_x", 0, kDownhillShare, "x", "-"},
                 {"downhill_y", 0, kDownhillShare, "y", "-"}};
-  tilt.price = kPriceOfAValue;
   tilt.of_world = true;
   tilt.describe = describe_floor_tilt;
   return tilt;
