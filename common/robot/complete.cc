@@ -42,17 +42,26 @@ class Completion {
 
   RobotWheel* find(std::string_view name) { return const_cast<RobotWheel*>(r_.wheel(name)); }
 
-  // The wheel of this name, made when the file has none.
-  RobotWheel& ensure(const std::string& name) {
+  // The wheel of this name, made like this when the file has none.
+  RobotWheel& ensure(const std::string& name, bool driven = true, bool steered = false) {
     if (RobotWheel* w = find(name)) return *w;
-    r_.wheels.push_back({});
-    r_.wheels.back().name = name;
-    return r_.wheels.back();
+    RobotWheel& made = r_.wheels.emplace_back();
+    made.name = name;
+    made.driven = driven;
+    made.steered = steered;
+    return made;
   }
 
   static void place(RobotWheel& wheel, double x_m, double y_m) {
     if (!wheel.x_m) wheel.x_m = x_m;
     if (!wheel.y_m) wheel.y_m = y_m;
+  }
+
+  // So far to either side.
+  void pair(const std::string& name, double x_m, double y_m, bool driven = true,
+            bool steered = false) {
+    place(ensure(name + "left", driven, steered), x_m, y_m);
+    place(ensure(name + "right", driven, steered), x_m, -y_m);
   }
 
   // Wheels of these names of which the file says no place stand for the sides of a robot.
@@ -79,23 +88,10 @@ class Completion {
     for (RobotWheel& w : r_.wheels) {
       if (w.kind == WheelKind::kCaster) w.driven = false;
     }
-    switch (r_.drive) {
-      case DriveKind::kDifferential:
-        return differential();
-      case DriveKind::kSkid:
-        return skid();
-      case DriveKind::kTracked:
-        return tracked();
-      case DriveKind::kOmni:
-        return omni();
-      case DriveKind::kMecanum:
-        return mecanum();
-      case DriveKind::kAckermann:
-        return ackermann();
-      case DriveKind::kTricycle:
-        return tricycle();
-    }
-    return {};
+    static constexpr Status (Completion::*kOfDrive[])() = {
+        &Completion::differential, &Completion::skid,      &Completion::tracked, &Completion::omni,
+        &Completion::mecanum,      &Completion::ackermann, &Completion::tricycle};
+    return (this->*kOfDrive[static_cast<std::size_t>(r_.drive)])();
   }
 
   Status need_separation() {
@@ -140,10 +136,7 @@ class Completion {
   Status differential() {
     RETURN_IF_ERROR(need_separation());
     const double half = *separation() / 2;
-    if (states_sides()) {
-      place(ensure("left"), 0, half);
-      place(ensure("right"), 0, -half);
-    }
+    if (states_sides()) pair("", 0, half);
     sides();
     prop(half);
     return {};
@@ -194,13 +187,11 @@ class Completion {
   Status tracked() {
     RETURN_IF_ERROR(need_separation());
     const double c = *separation() / 2;
+    pair("", 0, c);
     for (const char* name : {"left", "right"}) {
-      RobotWheel& tread = ensure(name);
+      RobotWheel& tread = *find(name);
       tread.kind = WheelKind::kTread;
-      place(tread, 0, name[0] == 'l' ? c : -c);
-      if (!tread.contact_length_m) {
-        tread.contact_length_m = 2 * half_base(c);
-      }
+      if (!tread.contact_length_m) tread.contact_length_m = 2 * half_base(c);
     }
     sides();
     return {};
@@ -251,15 +242,15 @@ class Completion {
         return missing("wheelbase and wheel_separation, or sum_of_robot_center_projection, in m");
       }
     }
-    for (const char* name : {"front_left", "front_right", "rear_left", "rear_right"}) {
-      if (placed && find(name) == nullptr) continue;
-      RobotWheel& w = ensure(name);
-      place(w, name[0] == 'f' ? lx : -lx, std::string(name).ends_with("left") ? ly : -ly);
+    if (!placed) {
+      pair("front_", lx, ly);
+      pair("rear_", -lx, ly);
     }
     for (RobotWheel& w : r_.wheels) {
       if (!w.driven) continue;
       w.kind = WheelKind::kMecanum;
-      if (w.roller_angle_rad == 0) w.roller_angle_rad = *w.x_m * *w.y_m > 0 ? -pi / 4 : pi / 4;
+      const bool as_usual = w.roller_angle_rad == 0 && w.x_m && w.y_m;
+      if (as_usual) w.roller_angle_rad = *w.x_m * *w.y_m > 0 ? -pi / 4 : pi / 4;
     }
     return {};
   }
@@ -280,16 +271,8 @@ class Completion {
     if (!k.wheelbase_m) return missing("wheelbase in m");
     const double track = stated_track();
     const double front = k.steering_track_width_m.value_or(track);
-    for (const char* name : {"front_left", "front_right", "rear_left", "rear_right"}) {
-      const bool made = find(name) == nullptr;
-      RobotWheel& w = ensure(name);
-      const bool ahead = name[0] == 'f';
-      const double sign = std::string(name).ends_with("left") ? 1 : -1;
-      place(w, ahead ? *k.wheelbase_m : 0, sign * (ahead ? front : track) / 2);
-      if (!made) continue;
-      w.steered = ahead;
-      w.driven = !ahead;
-    }
+    pair("front_", *k.wheelbase_m, front / 2, /*driven=*/false, /*steered=*/true);
+    pair("rear_", 0, track / 2);
     return {};
   }
 
@@ -297,19 +280,11 @@ class Completion {
     auto& k = r_.controller;
     if (!k.wheelbase_m) return missing("wheelbase in m");
     const double track = stated_track();
-    const bool made = find("front") == nullptr;
-    RobotWheel& front = ensure("front");
-    place(front, *k.wheelbase_m, 0);
-    if (made) {
-      front.steered = true;
+    if (find("front") == nullptr) {
       assume("the front wheel drives (where the others do, give all three in [wheels.NAME])");
     }
-    for (const char* name : {"rear_left", "rear_right"}) {
-      const bool fresh = find(name) == nullptr;
-      RobotWheel& w = ensure(name);
-      place(w, 0, name[5] == 'l' ? track / 2 : -track / 2);
-      if (fresh) w.driven = false;
-    }
+    place(ensure("front", true, /*steered=*/true), *k.wheelbase_m, 0);
+    pair("rear_", 0, track / 2, /*driven=*/false);
     return {};
   }
 

@@ -51,6 +51,24 @@ TEST(CompleteRobot, CrossesTheRollersOfAMecanumDrive) {
   EXPECT_EQ(robot.wheel("rear_left")->roller_angle_rad, std::numbers::pi / 4);
 }
 
+TEST(CompleteRobot, AsksForThePlaceOfAMecanumWheelBesideOthers) {
+  GroundRobot robot;
+  robot.drive = DriveKind::kMecanum;
+  robot.controller.wheel_radius_m = 0.05;
+  robot.channels = {"front_left", "front_right", "rear_left", "rear_right"};
+  for (const std::string& name : robot.channels) {
+    RobotWheel& wheel = robot.wheels.emplace_back();
+    wheel.name = name;
+    wheel.x_m = name.starts_with("front") ? 0.2 : -0.2;
+    wheel.y_m = name.ends_with("left") ? 0.2 : -0.2;
+  }
+  robot.wheels[2].x_m.reset();
+  const Status status = complete_robot(&robot);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("\"rear_left\" needs x and y"), std::string::npos)
+      << status.error().message;
+}
+
 TEST(CompleteRobot, MakesTheSideThatAFileLeavesOut) {
   GroundRobot robot = sides(DriveKind::kSkid);
   robot.wheels.pop_back();
