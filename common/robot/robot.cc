@@ -13,28 +13,23 @@ namespace {
 std::string number(double value) { return formatted("%.4g", value); }
 
 Status check_channels(const GroundRobot& robot) {
-  const auto& c = robot.channels;
-  const auto has = [&](const char* name) { return std::find(c.begin(), c.end(), name) != c.end(); };
-  if (c.empty()) return Error{"commands name no channels"};
-  switch (robot.command) {
-    case CommandKind::kDuties:
-    case CommandKind::kWheelSpeeds:
-      for (const std::string& name : c) {
-        const bool side = name == "left" || name == "right";
-        if (!side && robot.wheel(name) == nullptr) {
-          return Error{"channel \"" + name + "\" is neither left nor right nor a wheel's name"};
-        }
-      }
-      return {};
-    case CommandKind::kTwist:
-      if (has("v") && has("omega")) return {};
-      return Error{"twist commands need the channels v and omega"};
-    case CommandKind::kThrottleSteering:
-      if (has("throttle") && has("steering")) return {};
-      return Error{"throttle_steering commands need the channels throttle and steering"};
-    case CommandKind::kSpeedSteering:
-      if (has("speed") && has("steering")) return {};
-      return Error{"speed_steering commands need the channels speed and steering"};
+  struct Needed {
+    CommandKind of;
+    const char *first, *second;
+  };
+  constexpr Needed kNeeded[] = {{CommandKind::kTwist, "v", "omega"},
+                                {CommandKind::kThrottleSteering, "throttle", "steering"},
+                                {CommandKind::kSpeedSteering, "speed", "steering"}};
+  const auto has = [&](std::string_view name) { return contains(robot.channels, name); };
+  if (robot.channels.empty()) return Error{"commands name no channels"};
+  if (const Needed* needed = find_by(kNeeded, robot.command, &Needed::of)) {
+    if (has(needed->first) && has(needed->second)) return {};
+    return Error{command_kind_names()[static_cast<std::size_t>(robot.command)] +
+                 " commands need the channels " + needed->first + " and " + needed->second};
+  }
+  for (const std::string& name : robot.channels) {
+    if (name == "left" || name == "right" || robot.wheel(name) != nullptr) continue;
+    return Error{"channel \"" + name + "\" is neither left nor right nor a wheel's name"};
   }
   return {};
 }
@@ -71,28 +66,6 @@ Status check_sizes(const GroundRobot& robot) {
 }
 
 }  // namespace
-
-std::span<const std::string> drive_names() {
-  static const std::vector<std::string> names = {"differential", "skid",      "tracked", "omni",
-                                                 "mecanum",      "ackermann", "tricycle"};
-  return names;
-}
-
-std::span<const std::string> wheel_names() {
-  static const std::vector<std::string> names = {"plain", "omni", "mecanum", "caster", "tread"};
-  return names;
-}
-
-std::span<const std::string> side_names() {
-  static const std::vector<std::string> names = {"none", "left", "right"};
-  return names;
-}
-
-std::span<const std::string> command_kind_names() {
-  static const std::vector<std::string> names = {"duties", "wheel_speeds", "twist",
-                                                 "throttle_steering", "speed_steering"};
-  return names;
-}
 
 const RobotWheel* GroundRobot::wheel(std::string_view wanted) const {
   return find_by(wheels, wanted, &RobotWheel::name);

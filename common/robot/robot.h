@@ -17,17 +17,24 @@
 namespace gapfarm {
 
 enum class DriveKind { kDifferential, kSkid, kTracked, kOmni, kMecanum, kAckermann, kTricycle };
-// "differential", "skid", "tracked", "omni", "mecanum", "ackermann", "tricycle".
-std::span<const std::string> drive_names();
+inline std::span<const std::string> drive_names() {
+  static const std::vector<std::string> names = {"differential", "skid",      "tracked", "omni",
+                                                 "mecanum",      "ackermann", "tricycle"};
+  return names;
+}
 
 // A swivelling caster and a ball are one kind: they carry load and hardly resist.
 enum class WheelKind { kPlain, kOmni, kMecanum, kCaster, kTread };
-// "plain", "omni", "mecanum", "caster", "tread".
-std::span<const std::string> wheel_names();
+inline std::span<const std::string> wheel_names() {
+  static const std::vector<std::string> names = {"plain", "omni", "mecanum", "caster", "tread"};
+  return names;
+}
 
 enum class WheelSide { kNone, kLeft, kRight };  // whose motor drives it
-// "none", "left", "right".
-std::span<const std::string> side_names();
+inline std::span<const std::string> side_names() {
+  static const std::vector<std::string> names = {"none", "left", "right"};
+  return names;
+}
 
 struct RobotWheel {
   std::string name;
@@ -55,8 +62,11 @@ enum class CommandKind {
   kThrottleSteering,  // throttle and steering, [-1, 1]
   kSpeedSteering,     // rad/s of the traction wheel (or both), and rad of the steering
 };
-// "duties", "wheel_speeds", "twist", "throttle_steering", "speed_steering".
-std::span<const std::string> command_kind_names();
+inline std::span<const std::string> command_kind_names() {
+  static const std::vector<std::string> names = {"duties", "wheel_speeds", "twist",
+                                                 "throttle_steering", "speed_steering"};
+  return names;
+}
 
 // The controller's own idea of the robot, in the words of ros2_controllers.  It turns twists into
 // wheel speeds, right or wrong; the simulation rolls on the wheels above.

@@ -1,6 +1,7 @@
 // Reading robot.toml.
 
 #include <algorithm>
+#include <type_traits>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -57,8 +58,10 @@ void top_rows(Visitor& v, Robot& robot) {
   v.read("full_speed", m.full_speed_rad_s, 1e-3, 1e5, "rad/s");
 }
 
+// Written: those that say something of the robot.
 template <class Visitor, class Robot>
-void steering_sections(Visitor& v, Robot& robot) {
+void sections(Visitor& v, Robot& robot) {
+  constexpr bool reads = !std::is_const_v<Robot>;
   v.read("understeer", robot.steering.understeer_s2_m2, 0, 100, "s^2/m^2");
   v.within("steering", [&](auto& own) {
     auto& steering = robot.steering;
@@ -67,11 +70,7 @@ void steering_sections(Visitor& v, Robot& robot) {
     own.read("limit", steering.limit_rad, 0, 2, "rad");
     own.read("rate_limit", steering.rate_limit_rad_s, 1e-3, 1e3, "rad/s");
   });
-}
-
-template <class Visitor, class Robot>
-void throttle_section(Visitor& v, Robot& robot) {
-  v.within("throttle", [&](auto& own) {
+  const auto throttle_rows = [&](auto& own) {
     auto& throttle = robot.throttle;
     own.read("gain", throttle.gain, 0, 1e4, "m/s^2");
     own.read("zero", throttle.zero, 0, 1);
@@ -79,29 +78,20 @@ void throttle_section(Visitor& v, Robot& robot) {
     own.read("drag", throttle.drag, 0, 1e3, "1/s");
     own.read("coulomb", throttle.coulomb, 0, 1e3, "m/s^2");
     own.read("cornering", throttle.cornering, 0, 1e3);
-  });
-}
-
-template <class Visitor, class Robot>
-void centre_section(Visitor& v, Robot& robot) {
+  };
+  if (reads || is_throttled(robot)) v.within("throttle", throttle_rows);
   v.within("centre_of_mass", [&](auto& own) {
     own.read("x", robot.com_x_m, -50, 50, "m");
     own.read("y", robot.com_y_m, -50, 50, "m");
     own.read("z", robot.com_z_m, 1e-4, 50, "m");
   });
-}
-
-template <class Visitor, class Robot>
-void body_section(Visitor& v, Robot& robot) {
-  v.within("body", [&](auto& own) {
+  const auto body_rows = [&](auto& own) {
     own.read("length", robot.body_length_m, 1e-3, 50, "m");
     own.read("width", robot.body_width_m, 1e-3, 50, "m");
     own.read("height", robot.body_height_m, 1e-3, 50, "m");
-  });
-}
-
-template <class Visitor, class Robot>
-void marker_section(Visitor& v, Robot& robot) {
+  };
+  const bool has_body = robot.body_length_m || robot.body_width_m || robot.body_height_m;
+  if (reads || has_body) v.within("body", body_rows);
   v.within("marker", [&](auto& own) {
     own.read("x", robot.X_RM.x, -50, 50, "m");
     own.read("y", robot.X_RM.y, -50, 50, "m");
@@ -203,11 +193,7 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
   top_rows(top, robot);
   top.read("full_surface_speed", robot.motors.full_surface_speed_m_s, 1e-4, 100, "m/s");
   read_steering_table(top, robot.steering);
-  steering_sections(top, robot);
-  throttle_section(top, robot);
-  centre_section(top, robot);
-  body_section(top, robot);
-  marker_section(top, robot);
+  sections(top, robot);
   read_wheels(top, robot.wheels);
   top.finish();
   if (!errors.empty()) return errors.error();
@@ -225,11 +211,7 @@ std::string format_robot(const GroundRobot& robot) {
   out.raw("# A ground robot: SI units and radians; x ahead, y left (docs/formats.md).\n");
   write_top(robot, out);
   write_steering_table(robot.steering, out);
-  steering_sections(out, robot);
-  if (is_throttled(robot)) throttle_section(out, robot);
-  centre_section(out, robot);
-  if (robot.body_length_m || robot.body_width_m || robot.body_height_m) body_section(out, robot);
-  marker_section(out, robot);
+  sections(out, robot);
   for (const RobotWheel& wheel : robot.wheels) write_wheel(wheel, out);
   return out.text();
 }
