@@ -107,12 +107,10 @@ Eigen::VectorXd Fitter::whitened(const std::vector<Pose>& ends) const {
 
 Eigen::VectorXd Fitter::beside(const Eigen::VectorXd& u) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * observations_.size()));
-  Eigen::Index k = 0;
-  for (const Coordinate& c : space_.all()) {
-    if (c.kind == Coordinate::Kind::kColumn && u[k] != 0) {
-      sum -= u[k] * observations_.columns.col(static_cast<Eigen::Index>(c.row));
-    }
-    k += c.dimensions();
+  const std::vector<Eigen::Index> columns = columns_of_dimensions();
+  for (Eigen::Index k = 0; k < u.size(); ++k) {
+    const Eigen::Index c = columns[static_cast<std::size_t>(k)];
+    if (c >= 0 && u[k] != 0) sum -= u[k] * observations_.columns.col(c);
   }
   return sum;
 }

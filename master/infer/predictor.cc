@@ -44,11 +44,10 @@ std::string point_text(const Problem& problem, const Overrides& at) {
   return text + (others > 0 ? " and " + std::to_string(others) + " more" : "");
 }
 
-Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
+std::string bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
   const std::string why = result.message().empty() ? "" : " (" + result.message() + ")";
-  return {"the simulation ended with " + v1::Outcome_Name(result.outcome()) + why +
-              point_text(problem, at),
-          ErrorCode::kSimulation};
+  return "the simulation ended with " + v1::Outcome_Name(result.outcome()) + why +
+         point_text(problem, at);
 }
 
 Problem slower(Problem problem, double factor) {
@@ -131,15 +130,11 @@ std::vector<v1::Task> Predictor::tasks(const Overrides& at) const {
 
 Result<std::vector<std::vector<Pose>>> Predictor::ends(
     const std::vector<PredictionRequest>& requests) {
-  std::vector<std::optional<Error>> errors;
-  ASSIGN_OR_RETURN(auto all, simulate(hash_, requests, &errors));
+  ASSIGN_OR_RETURN(auto all, simulate(hash_, requests));
   std::vector<std::vector<Pose>> ends;
-  for (std::size_t k = 0; k < requests.size(); ++k) {
-    if (!all[k]) {
-      last_failure_ = errors[k]->message;
-      return *errors[k];
-    }
-    ends.push_back(std::move(*all[k]));
+  for (std::optional<std::vector<Pose>>& of_one : all) {
+    if (!of_one) return Error{last_failure_, ErrorCode::kSimulation};
+    ends.push_back(std::move(*of_one));
   }
   return ends;
 }
@@ -150,27 +145,24 @@ Error Predictor::failed(const std::string& what) const {
 
 Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::attempt(
     const std::vector<PredictionRequest>& requests) {
-  std::vector<std::optional<Error>> errors;
-  return simulate(hash_, requests, &errors);
+  return simulate(hash_, requests);
 }
 
 Result<std::optional<std::vector<Pose>>> Predictor::attempt_slower(const Overrides& at,
                                                                    double factor) {
-  std::vector<std::optional<Error>> errors;
-  ASSIGN_OR_RETURN(auto all, simulate(farm_.add_problem(to_proto(slower(problem_, factor))),
-                                      {{at, {}}}, &errors));
+  ASSIGN_OR_RETURN(auto all,
+                   simulate(farm_.add_problem(to_proto(slower(problem_, factor))), {{at, {}}}));
   return std::move(all.front());
 }
 
 Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
-    const std::string& problem, const std::vector<PredictionRequest>& requests,
-    std::vector<std::optional<Error>>* errors) {
-  errors->assign(requests.size(), std::nullopt);
+    const std::string& problem, const std::vector<PredictionRequest>& requests) {
+  std::vector<std::string> failures(requests.size());
   std::vector<v1::Task> tasks;
   std::vector<std::pair<std::size_t, std::vector<std::uint32_t>>> asked;  // request, trials
   for (std::size_t k = 0; k < requests.size(); ++k) {
     if (const Status s = within_bounds(problem_, requests[k].at); !s) {
-      (*errors)[k] = Error{s.error().message, ErrorCode::kSimulation};
+      failures[k] = s.error().message;
       continue;
     }
     // As many whoever works, so that the answers do not depend on it.
@@ -184,7 +176,7 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
   ASSIGN_OR_RETURN(const auto results, farm_.run(problem, tasks));
   std::vector<std::optional<std::vector<Pose>>> ends(requests.size());
   for (std::size_t k = 0; k < requests.size(); ++k) {
-    if ((*errors)[k]) continue;
+    if (!failures[k].empty()) continue;
     ends[k].emplace(requests[k].trials.empty() ? problem_.log.trials.size()
                                                : requests[k].trials.size());
   }
@@ -195,7 +187,7 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
       const bool broken =
           result.outcome() == v1::WORKER_FAILED || result.outcome() == v1::INVALID_REQUEST;
       if (broken) broken_ = result.message();
-      if (!(*errors)[k]) (*errors)[k] = bad_point(problem_, requests[k].at, result);
+      if (failures[k].empty()) failures[k] = bad_point(problem_, requests[k].at, result);
       ends[k].reset();
     }
     if (!ends[k]) continue;
@@ -210,9 +202,9 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
       (*ends[k])[place] = from_proto(result.predict().predictions(i).end());
     }
   }
-  for (const std::optional<Error>& error : *errors) {
-    if (error) last_failure_ = error->message;
-  }
+  const auto failed = [](const std::string& why) { return !why.empty(); };
+  const auto first = std::ranges::find_if(failures, failed);
+  if (first != failures.end()) last_failure_ = std::move(*first);
   return ends;
 }
 
@@ -229,7 +221,7 @@ Result<std::vector<std::vector<PathSample>>> Predictor::paths(
   std::vector<std::vector<PathSample>> paths;
   for (const v1::TaskResult& result : results) {
     if (result.outcome() != v1::OK) {
-      last_failure_ = bad_point(problem_, at, result).message;
+      last_failure_ = bad_point(problem_, at, result);
       return failed("a path");
     }
     std::vector<PathSample>& path = paths.emplace_back();

@@ -41,7 +41,7 @@ class Predictor {
   // farm's, and a simulation that did not end well (its point is named).
   Result<std::vector<std::vector<Pose>>> ends(const std::vector<PredictionRequest>& requests);
   // The same, but a point outside the parameters' bounds, or one whose simulation does not end
-  // well, has no ends; failed() says why.  Errors: the farm's alone.
+  // well, has no ends; failed() says why, of the first.  Errors: the farm's alone.
   Result<std::vector<std::optional<std::vector<Pose>>>> attempt(
       const std::vector<PredictionRequest>& requests);
   // The same for all trials at one point, every duty times `factor`, (0, 1]: how drives depend on
@@ -56,7 +56,7 @@ class Predictor {
   Result<std::vector<std::vector<PathSample>>> paths(const Overrides& at,
                                                      const std::vector<CommandSpec>& commands,
                                                      double interval_s);
-  // The last failure as an error of the simulation's.
+  // The first failure of the last batch that had one as an error of the simulation's.
   Error failed(const std::string& what) const;
   // Why a worker could not do its work, which is nobody's point; nothing: none failed.
   const std::optional<std::string>& broken() const { return broken_; }
@@ -69,8 +69,7 @@ class Predictor {
   std::vector<std::vector<std::uint32_t>> parts_of(const PredictionRequest& request,
                                                    std::size_t parts) const;
   Result<std::vector<std::optional<std::vector<Pose>>>> simulate(
-      const std::string& problem, const std::vector<PredictionRequest>& requests,
-      std::vector<std::optional<Error>>* errors);
+      const std::string& problem, const std::vector<PredictionRequest>& requests);
 
   Farm& farm_;
   const Problem& problem_;

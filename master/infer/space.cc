@@ -14,6 +14,12 @@ double least_positive(const Parameter& row) {
   return row.lower > 0 ? row.lower : kLeastShareOfRange * row.upper;
 }
 
+// Of a value that is searched as it is, or as its logarithm.
+double scaled(const Coordinate& c, const Parameter& row, double value) {
+  const bool log = c.kind == Kind::kLogarithm;
+  return (log ? std::log(std::max(value, least_positive(row))) : value) / c.size;
+}
+
 }  // namespace
 
 std::vector<Coordinate> columns(Eigen::Index count) {
@@ -42,16 +48,13 @@ Space::Space(const ParameterTable& table, std::vector<Coordinate> coordinates, O
     }
     const Parameter& row = table[c.row];
     const Interval within = c.within.value_or(Interval{row.lower, row.upper});
-    if (c.kind == Kind::kLinear) {
-      lower_[k] = within.lower / c.size;
-      upper_[k] = within.upper / c.size;
-    } else if (c.kind == Kind::kLogarithm) {
-      lower_[k] = std::log(std::max(within.lower, least_positive(row))) / c.size;
-      upper_[k] = std::log(within.upper) / c.size;
-    } else {
+    if (c.kind == Kind::kPolar) {
       const double most = c.of_ratio ? std::log(row.upper) : row.upper;
       lower_.segment<2>(k).setConstant(-most / c.size);
       upper_.segment<2>(k).setConstant(most / c.size);
+    } else {
+      lower_[k] = scaled(c, row, within.lower);
+      upper_[k] = scaled(c, row, within.upper);
     }
     k += c.dimensions();
   }
@@ -67,15 +70,13 @@ Eigen::VectorXd Space::from(const Overrides& values) const {
   for (const Coordinate& c : coordinates_) {
     if (c.kind == Kind::kColumn) {
       u[k] = 0;
-    } else if (c.kind == Kind::kLinear || c.kind == Kind::kAngle) {
-      u[k] = value(c.row) / c.size;
-    } else if (c.kind == Kind::kLogarithm) {
-      u[k] = std::log(std::max(value(c.row), least_positive((*table_)[c.row]))) / c.size;
-    } else {
+    } else if (c.kind == Kind::kPolar) {
       const double strength = c.of_ratio ? std::log(value(c.row)) : value(c.row);
       const double angle = c.symmetry * value(c.direction_row);
       u[k] = strength * std::cos(angle) / c.size;
       u[k + 1] = strength * std::sin(angle) / c.size;
+    } else {
+      u[k] = scaled(c, (*table_)[c.row], value(c.row));
     }
     k += c.dimensions();
   }
@@ -89,19 +90,13 @@ Overrides Space::values(const Eigen::VectorXd& u) const {
   };
   Eigen::Index k = 0;
   for (const Coordinate& c : coordinates_) {
-    if (c.kind == Kind::kColumn) {
-      // no parameter
-    } else if (c.kind == Kind::kAngle) {
-      put(c.row, wrap_angle(u[k] * c.size));
-    } else if (c.kind == Kind::kLinear) {
-      put(c.row, u[k] * c.size);
-    } else if (c.kind == Kind::kLogarithm) {
-      put(c.row, std::exp(u[k] * c.size));
-    } else {
-      const double strength = std::hypot(u[k], u[k + 1]) * c.size;
-      put(c.row, c.of_ratio ? std::exp(strength) : strength);
-      put(c.direction_row, std::atan2(u[k + 1], u[k]) / c.symmetry);
+    const bool polar = c.kind == Kind::kPolar;
+    const double at = c.size * (polar ? std::hypot(u[k], u[k + 1]) : u[k]);
+    const bool log = c.kind == Kind::kLogarithm || (polar && c.of_ratio);
+    if (c.kind != Kind::kColumn) {
+      put(c.row, log ? std::exp(at) : c.kind == Kind::kAngle ? wrap_angle(at) : at);
     }
+    if (polar) put(c.direction_row, std::atan2(u[k + 1], u[k]) / c.symmetry);
     k += c.dimensions();
   }
   return values;
