@@ -20,6 +20,14 @@ std::string formatted(const char* format, Values... values) {
   return text;
 }
 
+// "0.52 m [0.5, 0.54]", each number by printf's `format`.
+inline std::string with_interval(const char* format, double value, double lo, double hi,
+                                 std::string_view unit = "") {
+  std::string text = formatted(format, value);
+  if (!unit.empty()) text.append(" ").append(unit);
+  return text + " [" + formatted(format, lo) + ", " + formatted(format, hi) + "]";
+}
+
 // What `of` makes of every item, with `between` between them.
 template <class Range, class Of = std::identity>
 std::string joined(const Range& items, std::string_view between = ", ", Of of = {}) {

@@ -114,15 +114,10 @@ namespace {
 
 constexpr double kSame = 1e-4;  // of a size, as files round it
 
-struct Reported {
-  ReportedValues values;
-  RosFriction friction;
-  Eigen::MatrixXd covariance;  // of the values; of a fit
-};
-
-Result<Reported> read_source_of_export(const std::string& source, Console& console) {
+// All but the names of what is the user's.
+Result<RosExport> read_source_of_export(const std::string& source, Console& console) {
   ASSIGN_OR_RETURN(const auto diagnosed, values_in(source));
-  if (diagnosed) return Reported{*diagnosed, ros_friction(*diagnosed), {}};
+  if (diagnosed) return RosExport{source, "", *diagnosed, {}, ros_friction(*diagnosed), {}};
   ASSIGN_OR_RETURN(const auto ground, read_ground_source(source, console));
   ASSIGN_OR_RETURN(const auto fit, fit_source(ground, console));
   ReportedValues values = {ground.robot, ground.logs, {}};
@@ -132,7 +127,7 @@ Result<Reported> read_source_of_export(const std::string& source, Console& conso
                              interval_of(fit, i), fit.shown[k] != 0});
   }
   const RosFriction friction = ground.friction.across ? ground.friction : ros_friction(values);
-  return Reported{std::move(values), friction, fit.covariance};
+  return RosExport{source, "", std::move(values), fit.covariance, friction, {}};
 }
 
 std::string usual_controller(DriveKind drive) {
@@ -189,34 +184,24 @@ Status check_controller(const DriveFacts& file, const GroundRobot& robot,
 }
 
 Result<RosExport> export_of(const ExportCommand& command, Console& console) {
-  ASSIGN_OR_RETURN(auto reported_values, read_source_of_export(command.source, console));
-  const GroundRobot& robot = reported_values.values.given;
-  RosExport data;
-  data.source = command.source;
-  data.logs = reported_values.values.logs;
+  ASSIGN_OR_RETURN(auto data, read_source_of_export(command.source, console));
+  const GroundRobot& robot = data.reported.given;
   data.controller = usual_controller(robot.drive);
   if (!command.controllers.empty()) {
     ASSIGN_OR_RETURN(const auto text, read_text_file(command.controllers));
     ASSIGN_OR_RETURN(const auto read, parse_controllers(text, command.controllers));
     data.controller = read.drives.front().name;
-    RETURN_IF_ERROR(
-        check_controller(read.drives.front(), robot, ros_values(reported_values.values)));
+    RETURN_IF_ERROR(check_controller(read.drives.front(), robot, ros_values(data.reported)));
   }
-  data.kinematics = reported_values.values.values;
-  data.sizes = robot_sizes(reported_values.values);
-  data.covariance = reported_values.covariance;
-  data.values = ros_values(reported_values.values);
-  data.remarks = ros_remarks(reported_values.values);
-  data.friction = reported_values.friction;
   RETURN_IF_ERROR(name_wheels_of_export(command.urdf, robot, &data));
   return data;
 }
 
 Json export_json(const RosExport& data) {
   Json json = {{"controller", data.controller},
-               {"values", values_json(data.values, "key", "known")},
-               {"robot", values_json(data.sizes, "key", "known")},
-               {"kinematics", values_json(data.kinematics)}};
+               {"values", values_json(ros_values(data.reported), "key", "known")},
+               {"robot", values_json(robot_sizes(data.reported), "key", "known")},
+               {"kinematics", values_json(data.reported.values)}};
   if (data.covariance.size() > 0) json["covariance"] = data.covariance;
   if (data.friction.across) json["mu1"] = *data.friction.across;
   if (data.friction.across) json["mu2"] = *data.friction.along;

@@ -19,6 +19,12 @@ namespace {
 
 const double kWidestGrip = std::log(10.0);  // of a 90 % interval, beyond which it says nothing
 
+// Null: the log does not say that it is another.
+const ReportedValue* named_value(const ReportedValues& reported, std::string_view name) {
+  const ReportedValue* v = find_by(reported.values, name, &ReportedValue::name);
+  return v != nullptr && v->named ? v : nullptr;
+}
+
 // A product of ratios that are 1 in the robot's file, times what the file has: that is not what the
 // controller `had`, where the file knows better how the robot turns.
 ReportedValue product(const ReportedValues& reported, const std::string& key, double had,
@@ -29,8 +35,8 @@ ReportedValue product(const ReportedValues& reported, const std::string& key, do
   ReportedValue row{key, had, file, {file, file}, file != had};
   double least = file, most = file;
   const auto take = [&](const char* name, bool divide) {
-    const ReportedValue* v = find_by(reported.values, name, &ReportedValue::name);
-    if (v == nullptr || !v->named || v->reported <= 0 || v->interval.lower <= 0) return;
+    const ReportedValue* v = named_value(reported, name);
+    if (v == nullptr || v->reported <= 0 || v->interval.lower <= 0) return;
     row.named = true;
     row.reported = divide ? row.reported / v->reported : row.reported * v->reported;
     least = divide ? least / v->interval.upper : least * v->interval.lower;
@@ -43,14 +49,14 @@ ReportedValue product(const ReportedValues& reported, const std::string& key, do
 }
 
 std::string interval_text(const ReportedValue& row, bool fitted) {
-  return row.named ? fmt::format("{:.4g} [{:.4g}, {:.4g}]", row.reported, row.interval.lower,
-                                 row.interval.upper)
+  return row.named ? with_interval("%.4g", row.reported, row.interval.lower, row.interval.upper)
          : fitted  ? "this log does not show it"
                    : "as you have it";
 }
 
-std::string logs_text(const std::vector<std::string>& logs) {
-  return logs.empty() ? "its log" : joined(logs);
+std::string source_text(const RosExport& data) {
+  const std::vector<std::string>& logs = data.reported.logs;
+  return "From " + data.source + ", fitted to " + (logs.empty() ? "its log" : joined(logs));
 }
 
 auto describe_value(const char* name, const char* named) {
@@ -150,11 +156,10 @@ std::vector<std::string> ros_remarks(const ReportedValues& reported) {
   };
   std::vector<std::string> remarks;
   for (const Word& word : kLabels) {
-    const ReportedValue* v = find_by(reported.values, word.name, &ReportedValue::name);
-    if (v == nullptr || !v->named) continue;
-    remarks.push_back(fmt::format("{}: {:.4g} [{:.4g}, {:.4g}] {}; you have {:.4g}", word.text,
-                                  v->reported, v->interval.lower, v->interval.upper, word.unit,
-                                  v->had));
+    const ReportedValue* v = named_value(reported, word.name);
+    if (v == nullptr) continue;
+    remarks.push_back(fmt::format("{}: {} {}; you have {:.4g}", word.text, interval_text(*v, true),
+                                  word.unit, v->had));
   }
   return remarks;
 }
@@ -162,38 +167,38 @@ std::vector<std::string> ros_remarks(const ReportedValues& reported) {
 RosFriction ros_friction(const ReportedValues& reported) {
   const GroundRobot& robot = reported.given;
   RosFriction friction;
-  if (const ReportedValue* grip = find_by(reported.values, "grip", &ReportedValue::name);
-      grip != nullptr && grip->named && grip->interval.upper - grip->interval.lower < kWidestGrip) {
-    friction.across = std::exp(grip->reported) / kGravity_m_s2;
-    friction.from = fmt::format("friction across {:.3g} [{:.3g}, {:.3g}], from how hard it corners",
-                                *friction.across, std::exp(grip->interval.lower) / kGravity_m_s2,
-                                std::exp(grip->interval.upper) / kGravity_m_s2);
-    friction.along = friction.across;
+  const auto range_text = [](const ReportedValue& v, const auto& of) {
+    return with_interval("%.3g", of(v.reported), of(v.interval.lower), of(v.interval.upper));
+  };
+  const ReportedValue* grip = named_value(reported, "grip");
+  if (grip != nullptr && grip->interval.upper - grip->interval.lower < kWidestGrip) {
+    const auto held = [](double log) { return std::exp(log) / kGravity_m_s2; };
+    friction.along = friction.across = held(grip->reported);
+    friction.from = "friction across " + range_text(*grip, held) + ", from how hard it corners";
     return friction;
   }
-  const ReportedValue* turn = find_by(reported.values, "separation", &ReportedValue::name);
-  if (turn == nullptr || !turn->named || !skid_friction_ratio(robot, 1)) return friction;
+  const ReportedValue* turn = named_value(reported, "separation");
+  if (turn == nullptr || !skid_friction_ratio(robot, 1)) return friction;
   const auto ratio = [&](double times) { return *skid_friction_ratio(robot, times); };
   friction.along = robot.friction;
   friction.across = robot.friction * ratio(turn->reported);
-  friction.from = fmt::format(
-      "across over along {:.3g} [{:.3g}, {:.3g}], by four-point theory from how it turns; along as "
-      "you have it",
-      ratio(turn->reported), ratio(turn->interval.lower), ratio(turn->interval.upper));
+  friction.from = "across over along " + range_text(*turn, ratio) +
+                  ", by four-point theory from how it turns; along as you have it";
   return friction;
 }
 
 std::string ros_table(const RosExport& data) {
   std::string text = fmt::format("{:<52} {:>10}   {}\n", "parameter of " + data.controller,
                                  "you have", "the log says (90 %)");
-  for (const auto* rows : {&data.values, &data.sizes}) {
-    if (rows == &data.sizes && !rows->empty()) text += "of robot.toml, m and rad\n";
-    for (const ReportedValue& row : *rows) {
-      text += fmt::format("{:<52} {:>10.4g}   {}\n", row.name, row.had,
-                          interval_text(row, data.covariance.size() > 0));
-    }
-  }
-  for (const std::string& remark : data.remarks) text += "  " + remark + "\n";
+  const auto add = [&](const ReportedValue& row) {
+    text += fmt::format("{:<52} {:>10.4g}   {}\n", row.name, row.had,
+                        interval_text(row, data.covariance.size() > 0));
+  };
+  std::ranges::for_each(ros_values(data.reported), add);
+  const std::vector<ReportedValue> sizes = robot_sizes(data.reported);
+  if (!sizes.empty()) text += "of robot.toml, m and rad\n";
+  std::ranges::for_each(sizes, add);
+  for (const std::string& remark : ros_remarks(data.reported)) text += "  " + remark + "\n";
   for (const RosWheel& wheel : data.wheels) {
     if (!data.friction.across) break;
     const auto had = [](const std::optional<double>& mu) {
@@ -209,24 +214,23 @@ std::string ros_table(const RosExport& data) {
 }
 
 std::string ros_yaml(const RosExport& data) {
-  std::string text = "# From " + data.source + ", fitted to " + logs_text(data.logs) +
+  std::string text = "# " + source_text(data) +
                      ".\n# Merge into your controller's file; brackets are 90 % intervals.\n" +
                      data.controller + ":\n  ros__parameters:\n";
-  for (const ReportedValue& row : data.values) {
+  for (const ReportedValue& row : ros_values(data.reported)) {
     text += row.named
                 ? fmt::format("    {}: {:.6g}  # [{:.4g}, {:.4g}]; you had {:.6g}\n", row.name,
                               row.reported, row.interval.lower, row.interval.upper, row.had)
                 : fmt::format("    {}: {:.6g}  # as you have it: no other is named\n", row.name,
                               row.had);
   }
-  for (const std::string& remark : data.remarks) text += "    # " + remark + "\n";
+  for (const std::string& remark : ros_remarks(data.reported)) text += "    # " + remark + "\n";
   return text;
 }
 
 std::string ros_gazebo(const RosExport& data) {
   if (!data.friction.across) return {};
-  std::string text = "<!-- From " + data.source + ", fitted to " + logs_text(data.logs) + ": " +
-                     data.friction.from +
+  std::string text = "<!-- " + source_text(data) + ": " + data.friction.from +
                      ". mu1 is along the axle (fdir1), which alone stays where it is as "
                      "the wheel turns, mu2 along the wheel. -->\n";
   for (const RosWheel& wheel : data.wheels) {

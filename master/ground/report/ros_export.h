@@ -55,17 +55,12 @@ struct RosWheel {
 };
 
 struct RosExport {
-  std::string source;             // run or diagnosis
-  std::vector<std::string> logs;  // that it was fitted to
-  std::string controller;         // its name in the user's file
-  std::vector<ReportedValue> values;
-  std::vector<std::string> remarks;  // what no controller has a word for
+  std::string source;          // run or diagnosis
+  std::string controller;      // its name in the user's file
+  ReportedValues reported;     // by the kinematic model's names
+  Eigen::MatrixXd covariance;  // of these; empty: they were not fitted now
   RosFriction friction;
   std::vector<RosWheel> wheels;
-  // All that was fitted, by the kinematic model's names, and its covariance (of a fit; else empty).
-  std::vector<ReportedValue> kinematics = {};
-  Eigen::MatrixXd covariance = {};
-  std::vector<ReportedValue> sizes = {};
 };
 
 // The controller's parameters by what a log says; names and values follow the drive.

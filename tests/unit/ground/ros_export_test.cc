@@ -37,7 +37,7 @@ TEST(RosExport, GivesMultipliersWithWhatTheUserHad) {
   // What the log does not say stays as the user has it.
   EXPECT_FALSE(values[2].named);
   EXPECT_DOUBLE_EQ(values[2].reported, 1);
-  RosExport data{"diagnosis", reported.logs, "husky_velocity_controller", values, {}, {}, {}};
+  const RosExport data{"diagnosis", "husky_velocity_controller", reported, {}, {}, {}};
   const std::string yaml = ros_yaml(data);
   EXPECT_NE(yaml.find("husky_velocity_controller:\n  ros__parameters:\n"), std::string::npos);
   EXPECT_NE(yaml.find("wheel_separation_multiplier: 1.5  # [1.481, 1.537]; you had 1.875"),
@@ -49,8 +49,7 @@ TEST(RosExport, GivesMultipliersWithWhatTheUserHad) {
 
 TEST(RosExport, TakesFrictionFromHowASkidSteerTurns) {
   const ReportedValues reported = reported_of(kHusky, {{"separation", 1, 1, {0.98, 1.02}, true}});
-  RosExport data{"diagnosis", reported.logs,          "c", ros_values(reported),
-                 {},          ros_friction(reported), {}};
+  RosExport data{"diagnosis", "c", reported, {}, ros_friction(reported), {}};
   data.wheels = {{"front_left_wheel_link", 1.0, 1.0, Eigen::Vector3d(1e-9, 0, 1)}};
   ASSERT_TRUE(data.friction.across.has_value());
   EXPECT_NEAR(*data.friction.across, *data.friction.along, 1e-9);  // as the file has it
