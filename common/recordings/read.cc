@@ -205,9 +205,7 @@ std::size_t add_poses(const std::vector<CommandRow>& rows, bool increments, Logg
   return repeated;
 }
 
-std::string name_of(const RunKey& key) {
-  return key.first.empty() ? key.second : key.first + "/" + key.second;
-}
+std::string name_of(const RunKey& key) { return run_name(key.first, key.second); }
 
 }  // namespace
 
@@ -226,7 +224,7 @@ Status check_times(const LoggedRun& run, const std::string& where, double apart_
   const auto span = [](double from, double end) {
     return formatted("%.2f to ", from) + formatted("%.2f s", end);
   };
-  return Error{where + ": found poses of run " + quoted_word(name_of({run.session, run.run})) +
+  return Error{where + ": found poses of run " + quoted_word(run_name(run.session, run.run)) +
                " from " + span(c, d) + " and its commands from " + span(a, b) +
                ", expected one clock for both; does one of them count from another start, or in "
                "milliseconds? Write both in s since the same moment"};

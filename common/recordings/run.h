@@ -40,6 +40,11 @@ struct LoggedRun {
   std::vector<CommandRow> returns = {};
 };
 
+// As people name it among runs of several sessions.
+inline std::string run_name(const std::string& session, const std::string& run) {
+  return session.empty() ? run : session + "/" + run;
+}
+
 struct RunLog {
   std::vector<std::string> channels;        // of commands
   std::vector<std::string> wheel_channels;  // of wheel_speeds

@@ -1,6 +1,7 @@
 #include "common/recordings/windows.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace gapfarm {
 namespace {
@@ -25,6 +26,15 @@ double median_interval(const std::vector<PoseRow>& poses) {
   return intervals[intervals.size() / 2];
 }
 
+// Of the marker, by two poses that are not too far apart in time.
+void measure_speed(const PoseRow& from, const PoseRow& until, double most_s, CommandedRun* to) {
+  const double dt = until.t_s - from.t_s;
+  if (!(dt > 0 && dt <= most_s)) return;
+  const Twist xi = log(between(from.X_WM, until.X_WM));
+  to->speed_m_s = xi[0] / dt;
+  to->turn_rad_s = xi[2] / dt;
+}
+
 CommandedRun commanded(const LoggedRun& run) {
   CommandedRun to;
   to.commands = run.commands;
@@ -32,81 +42,39 @@ CommandedRun commanded(const LoggedRun& run) {
   const auto later = std::ranges::find_if(
       run.poses, [&](const PoseRow& p) { return p.t_s >= to.start_s + kSpeedSpan_s; });
   if (stands(run.commands.front()) || later == run.poses.end()) return to;
-  const double dt = later->t_s - to.start_s;
-  if (dt > 2 * kSpeedSpan_s) return to;
-  const Twist xi = gapfarm::log(between(run.poses.front().X_WM, later->X_WM));
-  to.speed_m_s = xi[0] / dt;
-  to.turn_rad_s = xi[2] / dt;
+  measure_speed(run.poses.front(), *later, 2 * kSpeedSpan_s, &to);
   return to;
 }
 
-class Cutter {
- public:
-  Cutter(const RunLog& log, const WindowSettings& settings, WindowedRuns* to)
-      : log_(log), settings_(settings), to_(*to) {}
-
-  void cut(std::size_t index) {
-    const LoggedRun& run = log_.runs[index];
-    const bool rests = stands(run.commands.front());
-    const double begin = run.poses.front().t_s + (rests ? 0 : settings_.run_in_s);
-    const auto first = std::find_if(run.poses.begin(), run.poses.end(),
-                                    [&](const PoseRow& p) { return p.t_s >= begin; });
-    const auto from = static_cast<std::size_t>(first - run.poses.begin());
-    for (const double horizon : settings_.horizons_s) {
-      if (horizon > 0) {
-        tile(index, from, horizon);
-      } else if (from + 1 < run.poses.size()) {
-        add(index, from, run.poses.size() - 1);
-      }
+// First and last pose of each window of a horizon, from a pose on.
+std::vector<std::pair<std::size_t, std::size_t>> tiles(const std::vector<PoseRow>& poses,
+                                                       std::size_t from, double horizon) {
+  std::vector<std::pair<std::size_t, std::size_t>> all;
+  if (horizon <= 0 && from + 1 < poses.size()) all.emplace_back(from, poses.size() - 1);
+  if (horizon <= 0) return all;
+  // Poses so rare that every way between two is a window of its own.
+  const bool rare = median_interval(poses) > horizon;
+  while (from + 1 < poses.size()) {
+    const double wanted = poses[from].t_s + horizon;
+    std::size_t end = from + 1;
+    while (end < poses.size() && poses[end].t_s < wanted) ++end;
+    // The pose before may be closer, and the last one near enough.
+    const bool early = end - 1 > from && poses[end - 1].t_s >= wanted - kSlack * horizon;
+    if (end == poses.size() && !early) break;
+    if (early && (end == poses.size() || wanted - poses[end - 1].t_s < poses[end].t_s - wanted)) {
+      --end;
     }
+    const bool gap = poses[end].t_s - poses[from].t_s > kGap * horizon;
+    if (!gap || rare) all.emplace_back(from, end);
+    from = end;
   }
-
- private:
-  void tile(std::size_t index, std::size_t from, double horizon) {
-    const std::vector<PoseRow>& poses = log_.runs[index].poses;
-    // Poses so rare that every way between two is a window of its own.
-    const bool rare = median_interval(poses) > horizon;
-    while (from + 1 < poses.size()) {
-      const double wanted = poses[from].t_s + horizon;
-      std::size_t end = from + 1;
-      while (end < poses.size() && poses[end].t_s < wanted) ++end;
-      // The pose before may be closer, and the last one near enough.
-      const bool early = end - 1 > from && poses[end - 1].t_s >= wanted - kSlack * horizon;
-      if (end == poses.size() && !early) return;
-      if (early && (end == poses.size() || wanted - poses[end - 1].t_s < poses[end].t_s - wanted)) {
-        --end;
-      }
-      const bool gap = poses[end].t_s - poses[from].t_s > kGap * horizon;
-      if (!gap || rare) add(index, from, end);
-      from = end;
-    }
-  }
-
-  void add(std::size_t index, std::size_t from, std::size_t end) {
-    const LoggedRun& run = log_.runs[index];
-    Trial trial;
-    trial.session = session_of(run);
-    trial.trial = static_cast<std::int64_t>(to_.log.trials.size());
-    trial.command = kWindowCommand;
-    trial.run = static_cast<std::uint32_t>(index);
-    trial.t_s = run.poses[from].t_s;
-    trial.duration_s = run.poses[end].t_s - run.poses[from].t_s;
-    trial.X_WS = run.poses[from].X_WM;
-    trial.X_WE = run.poses[end].X_WM;
-    for (Pose* X : {&trial.X_WS, &trial.X_WE}) X->theta = wrap_angle(X->theta);
-    to_.log.trials.push_back(std::move(trial));
-  }
-
-  const RunLog& log_;
-  const WindowSettings& settings_;
-  WindowedRuns& to_;
-};
+  return all;
+}
 
 constexpr double kHalfSpan_s = 0.25;  // of poses, either side of a start, that show its speed
 
 const PoseRow& pose_near(const std::vector<PoseRow>& poses, double t_s) {
-  const auto after = std::lower_bound(poses.begin(), poses.end(), t_s,
-                                      [](const PoseRow& p, double t) { return p.t_s < t; });
+  const auto after = std::ranges::lower_bound(poses, t_s, {}, &PoseRow::t_s);
   if (after == poses.begin()) return poses.front();
   if (after == poses.end()) return poses.back();
   const auto before = after - 1;
@@ -116,14 +84,8 @@ const PoseRow& pose_near(const std::vector<PoseRow>& poses, double t_s) {
 CommandedRun one_run(const LoggedRun& run, const Trial& trial, double run_in_s, double margin_s) {
   CommandedRun to;
   to.start_s = std::max(run.poses.front().t_s, *trial.t_s - run_in_s);
-  const PoseRow& from = pose_near(run.poses, to.start_s - kHalfSpan_s);
-  const PoseRow& until = pose_near(run.poses, to.start_s + kHalfSpan_s);
-  const double dt = until.t_s - from.t_s;
-  if (dt > 0 && dt <= 4 * kHalfSpan_s) {
-    const Twist xi = log(between(from.X_WM, until.X_WM));
-    to.speed_m_s = xi[0] / dt;
-    to.turn_rad_s = xi[2] / dt;
-  }
+  measure_speed(pose_near(run.poses, to.start_s - kHalfSpan_s),
+                pose_near(run.poses, to.start_s + kHalfSpan_s), 4 * kHalfSpan_s, &to);
   const double first = to.start_s - margin_s;
   const double last = *trial.t_s + *trial.duration_s + margin_s;
   for (std::size_t i = 0; i < run.commands.size(); ++i) {
@@ -137,11 +99,26 @@ CommandedRun one_run(const LoggedRun& run, const Trial& trial, double run_in_s, 
 
 }  // namespace
 
+Trial window_between(const RunLog& log, std::size_t run, std::size_t from, std::size_t end,
+                     std::size_t number) {
+  const std::vector<PoseRow>& poses = log.runs[run].poses;
+  Trial trial;
+  trial.session = session_of(log.runs[run]);
+  trial.trial = static_cast<std::int64_t>(number);
+  trial.command = kWindowCommand;
+  trial.run = static_cast<std::uint32_t>(run);
+  trial.t_s = poses[from].t_s;
+  trial.duration_s = poses[end].t_s - poses[from].t_s;
+  trial.X_WS = poses[from].X_WM;
+  trial.X_WE = poses[end].X_WM;
+  for (Pose* X : {&trial.X_WS, &trial.X_WE}) X->theta = wrap_angle(X->theta);
+  return trial;
+}
+
 Result<WindowedRuns> cut_windows(const RunLog& log, const WindowSettings& settings) {
   if (log.runs.empty()) return Error{"the log has no runs"};
   WindowedRuns windows;
   windows.log.notes = log.notes;
-  Cutter cutter(log, settings, &windows);
   double longest_s = 0;
   for (std::size_t i = 0; i < log.runs.size(); ++i) {
     const LoggedRun& run = log.runs[i];
@@ -152,7 +129,15 @@ Result<WindowedRuns> cut_windows(const RunLog& log, const WindowSettings& settin
     }
     longest_s = std::max(longest_s, run.poses.back().t_s - run.poses.front().t_s);
     windows.runs.push_back(commanded(run));
-    cutter.cut(i);
+    const double run_in_s = stands(run.commands.front()) ? 0 : settings.run_in_s;
+    const auto first =
+        std::ranges::lower_bound(run.poses, run.poses.front().t_s + run_in_s, {}, &PoseRow::t_s);
+    for (const double horizon : settings.horizons_s) {
+      const auto begin = static_cast<std::size_t>(first - run.poses.begin());
+      for (const auto& [from, end] : tiles(run.poses, begin, horizon)) {
+        windows.log.trials.push_back(window_between(log, i, from, end, windows.log.trials.size()));
+      }
+    }
   }
   if (windows.log.trials.empty()) {
     return Error{"no window fits into the runs, of which the longest has poses over " +

@@ -48,9 +48,11 @@ inline constexpr const char* kWindowCommand = "drive";
 Result<WindowedRuns> cut_windows(const RunLog& log, const WindowSettings& settings);
 
 // Trial::session of a run's windows.
-inline std::string session_of(const LoggedRun& run) {
-  return run.session.empty() ? run.run : run.session + "/" + run.run;
-}
+inline std::string session_of(const LoggedRun& run) { return run_name(run.session, run.run); }
+
+// Between two poses of a run, by their places in it, as the `number`th trial.
+Trial window_between(const RunLog& log, std::size_t run, std::size_t from, std::size_t end,
+                     std::size_t number);
 
 // Where the command is a throttle, errors of speed add up over a run; a window of its end would
 // depend on its beginning.  Gives each window a run of its own, which begins `run_in_s` before it

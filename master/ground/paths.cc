@@ -21,20 +21,13 @@ Status put_stretches(const RunLog& runs, double every_s, Problem* to, DrivenPath
   to->runs = whole.runs;
   to->log = {};
   for (const Trial& run : whole.log.trials) {
-    const LoggedRun& logged = runs.runs[*run.run];
+    const std::vector<PoseRow>& poses = runs.runs[*run.run].poses;
     DrivenPath path{run.session, {run.X_WS}, {run.X_WS}, {run.X_WS}, {*run.t_s}, *run.run};
-    double last_s = *run.t_s;
-    for (const PoseRow& pose : logged.poses) {
-      if (pose.t_s < last_s + every_s && &pose != &logged.poses.back()) continue;
-      if (pose.t_s <= *run.t_s) continue;
-      last_s = pose.t_s;
-      Trial stretch = run;
-      stretch.duration_s = pose.t_s - *run.t_s;
-      stretch.X_WE = pose.X_WM;
-      stretch.trial = static_cast<std::int64_t>(to->log.trials.size());
-      to->log.trials.push_back(std::move(stretch));
-      path.logged.push_back(pose.X_WM);
-      path.t_s.push_back(pose.t_s);
+    for (std::size_t k = 1; k < poses.size(); ++k) {
+      if (poses[k].t_s < path.t_s.back() + every_s && k + 1 < poses.size()) continue;
+      to->log.trials.push_back(window_between(runs, *run.run, 0, k, to->log.trials.size()));
+      path.logged.push_back(poses[k].X_WM);
+      path.t_s.push_back(poses[k].t_s);
     }
     paths->runs.push_back(std::move(path));
   }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "common/base/ranges.h"
 #include "common/recordings/run.h"
 #include "master/ground/tolerances.h"
 #include "master/infer/settings.h"
@@ -54,9 +55,7 @@ void add_gyro(const RunLog& log, WindowSet* set) {
     if (!turned) continue;
     set->turned_rad.resize(set->trials.size());
     set->turned_rad.push_back(*turned);
-    set->trials.push_back(trial);
-    set->horizon.push_back(set->horizon[i] + set->lengths);
-    set->run_of.push_back(set->run_of[i]);
+    set->add(trial, set->horizon[i] + set->lengths, set->run_of[i]);
     any = true;
   }
   if (any) set->horizons += set->lengths;
@@ -80,15 +79,7 @@ void add_returns(const GroundRobot& robot, const RunLog& log, WindowSet* set) {
     for (const CommandRow& row : run.returns) {
       const std::size_t end = run.poses.empty() ? 0 : pose_at(run, row.t_s);
       if (end == 0 || set->runs.size() != log.runs.size()) continue;
-      Trial trial;
-      trial.session = session_of(run);
-      trial.trial = static_cast<std::int64_t>(set->trials.size());
-      trial.command = kWindowCommand;
-      trial.run = static_cast<std::uint32_t>(r);
-      trial.t_s = run.poses.front().t_s;
-      trial.duration_s = run.poses[end].t_s - *trial.t_s;
-      trial.X_WS = run.poses.front().X_WM;
-      trial.X_WE = run.poses[end].X_WM;
+      const Trial trial = window_between(log, r, 0, end, set->trials.size());
       Return back;
       for (Eigen::Index k = 0; k < 3; ++k) {
         back.variance[k] = std::pow(row.values[static_cast<std::size_t>(k)], 2);
@@ -104,9 +95,7 @@ void add_returns(const GroundRobot& robot, const RunLog& log, WindowSet* set) {
         back.of_slip += kSlip * kSlip * way_m * shares.rowwise().sum();
       }
       if (skids(robot)) back.of_slip.setConstant(std::numeric_limits<double>::infinity());
-      set->trials.push_back(std::move(trial));
-      set->horizon.push_back(set->horizons++);
-      set->run_of.push_back(r);
+      set->add(trial, set->horizons++, r);
       set->returns.push_back(back);
     }
   }
@@ -175,7 +164,8 @@ Result<WindowSet> pose_windows(const RunLog& log, const WindowSettings& settings
     if (!cut) continue;
     if (once && !restarts && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
     last = set.trials.size();
-    for (const Trial& trial : cut->log.trials) set.run_of.push_back(*trial.run);
+    const std::vector<std::size_t> run_of =
+        mapped(cut->log.trials, [](const Trial& t) { return std::size_t{*t.run}; });
     if (restarts) {
       *cut = restart_at_measured_speed(log, std::move(*cut), settings.run_in_s, kClocksApart_s);
       for (Trial& trial : cut->log.trials) *trial.run += static_cast<std::uint32_t>(last);
@@ -183,9 +173,8 @@ Result<WindowSet> pose_windows(const RunLog& log, const WindowSettings& settings
     } else {
       set.runs = std::move(cut->runs);
     }
-    for (Trial& trial : cut->log.trials) {
-      set.trials.push_back(std::move(trial));
-      set.horizon.push_back(set.horizons);
+    for (std::size_t i = 0; i < run_of.size(); ++i) {
+      set.add(std::move(cut->log.trials[i]), set.horizons, run_of[i]);
     }
     ++set.horizons;
     set.lengths_s.push_back(horizon);

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -54,6 +55,11 @@ struct WindowSet {
   // robot's kinematics do.
   std::function<std::vector<std::vector<Pose>>(const std::vector<Kinematics>&)> simulated = {};
 
+  void add(Trial trial, int of_horizon, std::size_t of_run) {
+    trials.push_back(std::move(trial));
+    horizon.push_back(of_horizon);
+    run_of.push_back(of_run);
+  }
   Sense sense_of(std::size_t trial) const {
     if (horizon[trial] < lengths) return Sense::kPose;
     return horizon[trial] < horizons - static_cast<int>(returns.size()) ? Sense::kGyro
