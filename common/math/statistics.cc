@@ -88,9 +88,9 @@ MeanCovariance weighted_mean_covariance(const Eigen::MatrixXd& points,
 }
 
 std::vector<std::size_t> resample_blocks(std::span<const std::vector<std::size_t>> blocks,
-                                         Stream& stream) {
+                                         Stream& stream, std::size_t spared) {
   std::vector<std::size_t> sample;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
+  for (std::size_t i = spared; i < blocks.size(); ++i) {
     const std::vector<std::size_t>& block = blocks[stream.below(blocks.size())];
     sample.insert(sample.end(), block.begin(), block.end());
   }
@@ -99,12 +99,12 @@ std::vector<std::size_t> resample_blocks(std::span<const std::vector<std::size_t
 
 Interval bootstrap_interval(std::span<const std::vector<std::size_t>> blocks,
                             const std::function<double(std::span<const std::size_t>)>& statistic,
-                            double coverage, unsigned repeats, Stream& stream) {
+                            double coverage, unsigned repeats, Stream& stream, std::size_t spared) {
   assert(!blocks.empty() && repeats > 0 && coverage > 0 && coverage < 1);
   std::vector<double> draws;
   draws.reserve(repeats);
   for (unsigned i = 0; i < repeats; ++i) {
-    draws.push_back(statistic(resample_blocks(blocks, stream)));
+    draws.push_back(statistic(resample_blocks(blocks, stream, spared)));
   }
   return {quantile(draws, (1 - coverage) / 2), quantile(draws, (1 + coverage) / 2)};
 }

@@ -46,15 +46,17 @@ MeanCovariance weighted_mean_covariance(const Eigen::MatrixXd& points,
                                         std::span<const double> weights);
 
 // Indices of one bootstrap sample that draws whole blocks with replacement until as many blocks are
-// drawn as there are; `blocks[i]` lists the indices of block i (a session, say).
+// drawn as there are, less those spared; `blocks[i]` lists the indices of block i (a session, say).
 std::vector<std::size_t> resample_blocks(std::span<const std::vector<std::size_t>> blocks,
-                                         Stream& stream);
+                                         Stream& stream, std::size_t spared = 0);
 
 // Percentile interval of `statistic` over `repeats` block bootstrap samples (Efron 1979; Kuensch
-// 1989).  `coverage` in (0, 1).  REQUIRES: blocks and repeats are not empty / zero.
+// 1989).  `coverage` in (0, 1); of few blocks one is spared, lest their scatter be taken for small.
+// REQUIRES: blocks and repeats are not empty / zero.
 Interval bootstrap_interval(std::span<const std::vector<std::size_t>> blocks,
                             const std::function<double(std::span<const std::size_t>)>& statistic,
-                            double coverage, unsigned repeats, Stream& stream);
+                            double coverage, unsigned repeats, Stream& stream,
+                            std::size_t spared = 0);
 
 // Adjusted p-values in the input's order, each in [0, 1]: rejecting those below a level keeps the
 // family-wise error at that level (Holm 1979).

@@ -69,15 +69,12 @@ WindowErrors medians_of(std::span<const WindowRow> windows, WindowError WindowRo
           middle(&WindowError::position_m, true), middle(&WindowError::heading_rad, true)};
 }
 
-std::vector<double> each(std::span<const WindowRow> windows, WindowError WindowRow::*which,
-                         double WindowError::*of) {
-  return mapped(windows, [&](const WindowRow& row) { return row.*which.*of; });
-}
-
 DrawnRatio drawn_ratio_of(std::span<const WindowRow> windows, double WindowError::*of,
                           std::span<const std::size_t> run) {
-  return drawn_ratio(each(windows, &WindowRow::simulation, of),
-                     each(windows, &WindowRow::kinematics, of), run, 1);
+  const auto each = [&](WindowError WindowRow::*which) {
+    return mapped(windows, [&](const WindowRow& row) { return row.*which.*of; });
+  };
+  return drawn_ratio(each(&WindowRow::simulation), each(&WindowRow::kinematics), run, 1);
 }
 
 // `run` of each window.
@@ -128,9 +125,8 @@ std::string significantly_apart(const Horizons& horizons) {
       untold > 0 ? fmt::format("; {} of too few windows", untold) : "");
 }
 
-constexpr std::size_t kRatioDraws = 1000;
+constexpr unsigned kRatioDraws = 1000;
 constexpr std::size_t kLeastDrawn = 5;  // fewer do not span 90 % of where a median may be
-constexpr double kRatioTail = 0.05;
 constexpr double kNoError = 1e-12;
 
 double ratio_of(std::span<const double> own, std::span<const double> baseline) {
@@ -281,18 +277,14 @@ DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> base
   const auto groups = groups_of(run);
   if (groups.size() < kLeastDrawn) return drawn;
   Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
-  std::vector<double> ratios;
-  for (std::size_t draw = 0; draw < kRatioDraws; ++draw) {
-    std::vector<double> of_own, of_baseline;
-    for (std::size_t k = 0; k + 1 < groups.size(); ++k) {
-      for (const std::size_t i : groups[stream.below(groups.size())]) {
-        of_own.push_back(own[i]);
-        of_baseline.push_back(baseline[i]);
-      }
-    }
-    ratios.push_back(ratio_of(of_own, of_baseline));
-  }
-  drawn.interval = {quantile(ratios, kRatioTail), quantile(ratios, 1 - kRatioTail)};
+  const auto ratio = [&](std::span<const std::size_t> windows) {
+    const auto of = [&](std::span<const double> errors) {
+      return mapped(windows, [&](std::size_t i) { return errors[i]; });
+    };
+    return ratio_of(of(own), of(baseline));
+  };
+  const auto [lo, hi] = bootstrap_interval(groups, ratio, 0.9, kRatioDraws, stream, /*spared=*/1);
+  drawn.interval = {lo, hi};
   return drawn;
 }
 
