@@ -148,7 +148,7 @@ WindowFit with_delay(const WindowFitter& fitter, const WindowFit& fit) {
   for (double size = kShift_s; size <= kMostShift_s; size *= 1.5) {
     for (const double shift : {size, -size}) others.emplace_back(fit.values)[at] += shift;
   }
-  const Eigen::VectorXd best = best_held(fitter, rows, fit.values, fit.objective, others);
+  const Eigen::VectorXd best = best_held(fitter, rows, fit.values, others, fit.objective);
   if (best == fit.values) return fit;
   WindowFit moved = fitter.fit(rows, {}, best);
   return moved.objective > fit.objective + kLeastChangeGain ? moved : fit;

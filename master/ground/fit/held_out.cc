@@ -41,9 +41,11 @@ std::vector<char> out_with(int fold, const std::vector<int>& folds) {
   return mapped(folds, [&](int of_block) { return static_cast<char>(of_block == fold); });
 }
 
-HeldOutGain with_interval(double mean, std::vector<double> drawn) {
-  const auto [lo, hi] = ninety_percent_of(std::move(drawn));
-  return {mean, lo, hi};
+// Of what depends on how often each block counts.
+template <class Of>
+HeldOutGain drawn_gain(const WindowSet& windows, std::uint64_t seed, const Of& of) {
+  const auto [lo, hi] = ninety_percent_of(mapped(draw_blocks(windows, seed, 0), of));
+  return {of(std::vector<double>(windows.blocks, 1.0)), lo, hi};
 }
 
 }  // namespace
@@ -140,28 +142,20 @@ HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const
   const std::vector<double> gains = block_gains(windows, with, without);
   std::vector<double> counts(gains.size(), 0.0);
   for (const int block : windows.block) counts[block] += 1;
-  std::vector<double> drawn;
-  for (const std::vector<double>& times : draw_blocks(windows, seed, 0)) {
-    drawn.push_back(weighted(gains, times) / std::max(1.0, weighted(counts, times)));
-  }
-  const double sum = weighted(gains, std::vector<double>(gains.size(), 1.0));
-  return with_interval(sum / static_cast<double>(with.nats.size()), std::move(drawn));
+  return drawn_gain(windows, seed, [&](const std::vector<double>& times) {
+    return weighted(gains, times) / std::max(1.0, weighted(counts, times));
+  });
 }
 
 HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
                          const WindowFit& best, const WindowFit& worst, std::uint64_t seed) {
   const std::vector<double> gained = block_gains(windows, with, without);
   const std::vector<double> gap = block_gains(windows, best, worst);
-  // What is gained is part of the gap, so that a share above 0 is a gain above 0.
-  const auto share = [](double part, double all) {
-    return part > 0 ? part / std::max(part, all) : 0.0;
-  };
-  std::vector<double> drawn;
-  for (const std::vector<double>& times : draw_blocks(windows, seed, 0)) {
-    drawn.push_back(share(weighted(gained, times), weighted(gap, times)));
-  }
-  const std::vector<double> once(gained.size(), 1.0);
-  return with_interval(share(weighted(gained, once), weighted(gap, once)), std::move(drawn));
+  return drawn_gain(windows, seed, [&](const std::vector<double>& times) {
+    // What is gained is part of the gap, so that a share above 0 is a gain above 0.
+    const double part = weighted(gained, times);
+    return part > 0 ? part / std::max(part, weighted(gap, times)) : 0.0;
+  });
 }
 
 std::vector<Estimate> derived_estimates(

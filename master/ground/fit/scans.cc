@@ -11,12 +11,13 @@ constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the 
 }  // namespace
 
 Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                          const Eigen::VectorXd& values, double most,
-                          const std::vector<Eigen::VectorXd>& others) {
+                          const Eigen::VectorXd& values, const std::vector<Eigen::VectorXd>& others,
+                          std::optional<double> most) {
   Eigen::VectorXd best = values;
+  if (!most) most = fitter.hold(rows, values).objective;
   for (const Eigen::VectorXd& other : others) {
     const double objective = fitter.hold(rows, other).objective;
-    if (objective <= most) continue;
+    if (objective <= *most) continue;
     most = objective;
     best = other;
   }
@@ -33,7 +34,7 @@ Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>
       others.emplace_back(values)[row_index(rows, "delay")] += shift;
     }
   }
-  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
+  return best_held(fitter, rows, values, others);
 }
 
 Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,
@@ -47,7 +48,7 @@ Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>&
       moved[shape] = sharp;
     }
   }
-  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
+  return best_held(fitter, rows, values, others);
 }
 
 Eigen::VectorXd scan_size(const WindowFitter& fitter, const std::vector<FitRow>& rows,
@@ -57,7 +58,7 @@ Eigen::VectorXd scan_size(const WindowFitter& fitter, const std::vector<FitRow>&
   for (double size = plausible_error(of); size > of.tolerance; size /= 2) {
     others.emplace_back(values)[values.size() - 1] = of.nominal + size;
   }
-  return best_held(fitter, rows, values, fitter.hold(rows, values).objective, others);
+  return best_held(fitter, rows, values, others);
 }
 
 }  // namespace gapfarm

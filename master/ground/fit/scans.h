@@ -2,17 +2,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
 
-// The best of some values, each as it is with scales of its own, and of those that `most` nats are
-// of.
+// The best of some values, each as it is with scales of its own; `most`: nats of the first, which
+// are known.
 Eigen::VectorXd best_held(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                          const Eigen::VectorXd& values, double most,
-                          const std::vector<Eigen::VectorXd>& others);
+                          const Eigen::VectorXd& values, const std::vector<Eigen::VectorXd>& others,
+                          std::optional<double> most = {});
 
 // Values whose delay is the best of those within 10 s of where it stands: one that is far off is
 // no slope away.

@@ -69,7 +69,7 @@ class SimulationFit {
   Coordinate coordinate(std::size_t gene, const Overrides& centre) const;
   Space space(const std::vector<std::size_t>& genes, const Overrides& start) const;
   Overrides start_of(const Genome& genome) const;
-  Genome genome_at(const Climb& climb) const;
+  Genome genome_at(const Overrides& at) const;
   void observe(const Kinematics& kinematics);
   Eigen::VectorXd whitened(const Ends& ends) const;
   Result<std::vector<Climb>> climbs(const Genome& start, const Genome& firm);
@@ -140,8 +140,7 @@ Overrides SimulationFit::start_of(const Genome& genome) const {
   return at;
 }
 
-Genome SimulationFit::genome_at(const Climb& climb) const {
-  const Overrides at = climb.space.values(climb.fit.u);
+Genome SimulationFit::genome_at(const Overrides& at) const {
   return mapped(problem_.genes, [&](const Gene& gene) {
     return encode_gene(problem_.table(), gene, value_at(problem_, at, gene.row));
   });
@@ -271,7 +270,7 @@ Status SimulationFit::judge(const Climb& best, const Genome& start, const Genome
   const auto theirs = by_parts(fits.scores(whitened(baseline_)));
   const infer::PairedGain gain = infer::paired_gain(own, theirs);
   found->held_out_gain = gain.sum;
-  found->genome = genome_at(best);
+  found->genome = genome_at(best.space.values(best.fit.u));
   double most = gain.sum - gain.se;
   const std::array<const Genome*, 2> kinematic = {&start, &firm};
   for (const Genome* genome : kinematic) {
@@ -320,9 +319,9 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   const ParameterValues values = kinematic_start(problem_, kinematics);
   const ParameterValues grip = without_slip(problem_, values);
   const auto genome_of = [&](const ParameterValues& of) {
-    return mapped(problem_.genes, [&](const Gene& gene) {
-      return encode_gene(problem_.table(), gene, of[gene.row]);
-    });
+    Overrides at;
+    for (const Gene& gene : problem_.genes) at[gene.row] = of[gene.row];
+    return genome_at(at);
   };
   const Genome start = genome_of(values), firm = genome_of(grip);
   SimulatedStart found;

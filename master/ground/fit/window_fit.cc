@@ -265,25 +265,32 @@ std::vector<Eigen::MatrixXd> WindowFitter::slopes(const WindowFit& fit) const {
   return J;
 }
 
-void WindowFitter::Equations::add(const Eigen::RowVectorXd& slope, double residual, double weight,
-                                  double curvature) {
-  H += weight * curvature * slope.transpose() * slope;
-  g += weight * slope.transpose() * residual;
+std::vector<WindowFitter::Equations> WindowFitter::equations_of(
+    const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J, const std::vector<double>& use,
+    const std::vector<int>& part, const std::vector<Eigen::Vector3d>& curvature) const {
+  const Eigen::Index n = fit.values.size();
+  std::vector<Equations> all(static_cast<std::size_t>(1 + std::ranges::max(part)),
+                             {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)});
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    if (use[i] == 0) continue;
+    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+    auto& [H, g] = all[static_cast<std::size_t>(part[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const Eigen::RowVectorXd slope = J[i].row(c);
+      const double r = fit.residuals[i][c], w = use[i] * window_weight(r, fit.scales[h][c]);
+      H += w * curvature[h][c] * slope.transpose() * slope;
+      g += w * slope.transpose() * r;
+    }
+  }
+  return all;
 }
 
 WindowFitter::Equations WindowFitter::normal_equations(const WindowFit& fit,
                                                        const std::vector<Eigen::MatrixXd>& J,
                                                        const std::vector<double>& use) const {
-  const Eigen::Index n = fit.values.size();
-  Equations equations{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
-  for (std::size_t i = 0; i < use.size(); ++i) {
-    if (use[i] == 0) continue;
-    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      const double r = fit.residuals[i][c];
-      equations.add(J[i].row(c), r, use[i] * window_weight(r, s[c]));
-    }
-  }
+  const std::vector<Eigen::Vector3d> as_weighted(fit.scales.size(), Eigen::Vector3d::Ones());
+  Equations equations =
+      equations_of(fit, J, use, std::vector<int>(use.size(), 0), as_weighted).front();
   const Eigen::MatrixXd P = prior_precision(fit.rows);
   equations.H += P;
   equations.g += P * (fit.values - nominals(fit.rows));
@@ -345,12 +352,7 @@ WindowFit WindowFitter::hold(const std::vector<FitRow>& rows, const Eigen::Vecto
 
 WindowFit WindowFitter::judge(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
                               const std::vector<char>& held_out) const {
-  fit.residuals = raw;
-  for (std::size_t i = 0; i < shapes_.size(); ++i) fit.residuals[i] = shapes_[i] * raw[i];
-  fit.scales.clear();
-  rescale(&fit, uses(held_out));
-  score(&fit, uses(held_out));
-  return fit;
+  return shaped(std::move(fit), raw, shapes_, uses(held_out));
 }
 
 Eigen::Matrix3d WindowFitter::whitener(const WindowFit& fit, std::size_t window) const {

@@ -202,13 +202,19 @@ class WindowFitter {
   struct Equations {
     Eigen::MatrixXd H;
     Eigen::VectorXd g;
-    void add(const Eigen::RowVectorXd& slope, double residual, double weight, double curvature = 1);
   };
-  // Priors in.
+  // Of each part of the windows, without priors; of every horizon and component H is so much of
+  // what weights make it.
+  std::vector<Equations> equations_of(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
+                                      const std::vector<double>& use, const std::vector<int>& part,
+                                      const std::vector<Eigen::Vector3d>& curvature) const;
+  // Of all, priors in.
   Equations normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
                              const std::vector<double>& use) const;
-  // Of each block, without priors; H as the density curves.
-  std::vector<Equations> equations_of_blocks(const WindowFit& fit) const;
+  // Of each block; H as the density curves.
+  std::vector<Equations> equations_of_blocks(const WindowFit& fit) const {
+    return equations_of(fit, slopes(fit), uses({}), windows_.block, curvature_shares(fit));
+  }
   // With slopes of a fit nearby.
   bool step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J, const std::vector<double>& use,
             double* damping) const;
@@ -226,8 +232,12 @@ class WindowFitter {
 
   void shape_by_speed();
   std::vector<Eigen::Matrix3d> noise_shapes(double least) const;
-  // Nats of a fit's residuals (`raw`: as they are) under such shapes, with scales of their own.
-  double nats_shaped(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+  // A fit with these residuals (`raw`: as they are) under such shapes, with scales of their own;
+  // its nats.
+  WindowFit shaped(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+                   const std::vector<Eigen::Matrix3d>& shapes,
+                   const std::vector<double>& use) const;
+  double nats_shaped(const WindowFit& fit, const std::vector<Eigen::Vector3d>& raw,
                      const std::vector<Eigen::Matrix3d>& shapes) const;
   void take_biases_out(std::vector<Eigen::Vector3d>* r) const;
   void weigh_by_commands(const WindowFit& fit);

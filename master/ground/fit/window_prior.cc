@@ -124,23 +124,6 @@ std::vector<Eigen::Vector3d> WindowFitter::curvature_shares(const WindowFit& fit
   return curvatures;
 }
 
-std::vector<WindowFitter::Equations> WindowFitter::equations_of_blocks(const WindowFit& fit) const {
-  const Eigen::Index n = fit.values.size();
-  const std::vector<double> use = uses({});
-  const std::vector<Eigen::MatrixXd> J = slopes(fit);
-  const std::vector<Eigen::Vector3d> curvature = curvature_shares(fit);
-  std::vector<Equations> blocks(static_cast<std::size_t>(windows_.blocks),
-                                {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)});
-  for (std::size_t i = 0; i < use.size(); ++i) {
-    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      const double r = fit.residuals[i][c], w = use[i] * window_weight(r, fit.scales[h][c]);
-      blocks[static_cast<std::size_t>(windows_.block[i])].add(J[i].row(c), r, w, curvature[h][c]);
-    }
-  }
-  return blocks;
-}
-
 Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bool all) const {
   const Eigen::Index n = fit.values.size();
   const std::vector<Equations> blocks = equations_of_blocks(fit);
@@ -223,17 +206,25 @@ std::vector<Eigen::Matrix3d> WindowFitter::noise_shapes(double least) const {
   return shapes;
 }
 
-double WindowFitter::nats_shaped(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+WindowFit WindowFitter::shaped(WindowFit fit, const std::vector<Eigen::Vector3d>& raw,
+                               const std::vector<Eigen::Matrix3d>& shapes,
+                               const std::vector<double>& use) const {
+  fit.residuals = raw;
+  for (std::size_t i = 0; i < shapes.size(); ++i) fit.residuals[i] = shapes[i] * raw[i];
+  fit.scales.clear();
+  rescale(&fit, use);
+  score(&fit, use);
+  return fit;
+}
+
+double WindowFitter::nats_shaped(const WindowFit& fit, const std::vector<Eigen::Vector3d>& raw,
                                  const std::vector<Eigen::Matrix3d>& shapes) const {
   const std::vector<double> use = uses({});
   double volumes = 0;
   for (std::size_t i = 0; i < raw.size(); ++i) {
-    fit.residuals[i] = shapes[i] * raw[i];
     volumes += use[i] * std::log(shapes[i].determinant());
   }
-  fit.scales.clear();
-  rescale(&fit, use);
-  return score(&fit, use) + volumes;
+  return shaped(fit, raw, shapes, use).objective + volumes;
 }
 
 double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
@@ -241,10 +232,7 @@ double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
   if (windows_.noise.empty() || shapes_.empty()) return best;
   const std::vector<Eigen::Vector3d> raw = raw_residuals(fit);
   // What is stated is this factor too small at most: the rest is not the matcher's.
-  WindowFit plain = fit;
-  plain.residuals = raw;
-  plain.scales.clear();
-  rescale(&plain, uses({}));
+  const WindowFit plain = shaped(fit, raw, {}, uses({}));
   const std::vector<double> middle = middle_variances(windows_);
   std::vector<double> ratios;
   for (std::size_t k = 0; k < 3 * static_cast<std::size_t>(windows_.lengths); ++k) {
