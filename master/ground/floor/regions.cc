@@ -1,12 +1,16 @@
+// Floors that are not the same or not level all over.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "common/base/constants.h"
+#include "common/base/text.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/hypotheses.h"
 #include "master/ground/tolerances.h"
@@ -70,58 +74,54 @@ double scatter_of(const std::vector<Vector2d>& places) {
 
 Vector2d direction_of(double angle) { return {std::cos(angle), std::sin(angle)}; }
 
-// The parts of the floor that some values state.
-struct Line {
+double value_of(const std::vector<FitRow>& rows, const VectorXd& values, std::string_view name) {
+  return values[row_index(rows, name)];
+}
+
+// A part of the floor, by the rows that are named after it.
+struct Region {
+  std::string name;
   // Ratios that are tried beside what slopes promise, as of two floors that differ clearly.  Lines
   // are looked at from either side.
-  static constexpr double kTried[] = {0.75};
-  double angle, offset, ratio;
+  std::vector<double> tried;
 
-  Line(const std::vector<FitRow>& rows, const VectorXd& values)
-      : angle(values[row_index(rows, "edge_angle")]),
-        offset(values[row_index(rows, "edge_offset")]),
-        ratio(values[row_index(rows, "edge_ratio")]) {}
-  bool may_be(const std::vector<Vector2d>&) const { return ratio > 0; }
-  bool has(const Vector2d& place) const { return place.dot(direction_of(angle)) > offset; }
-};
-
-struct Circle {
-  static constexpr double kTried[] = {0.75, 1 / 0.75};
-  Vector2d middle;
-  double radius, ratio;
-
-  Circle(const std::vector<FitRow>& rows, const VectorXd& values)
-      : middle(values[row_index(rows, "patch_x")], values[row_index(rows, "patch_y")]),
-        radius(values[row_index(rows, "patch_radius")]),
-        ratio(values[row_index(rows, "patch_ratio")]) {}
-  // One that is larger than the log reaches is an edge.
-  bool may_be(const std::vector<Vector2d>& places) const {
-    return ratio > 0 && radius < kLargestPatch * scatter_of(places);
+  double ratio(const std::vector<FitRow>& rows, const VectorXd& values) const {
+    return value_of(rows, values, name + "_ratio");
   }
-  bool has(const Vector2d& place) const { return (place - middle).norm() < radius; }
 };
+const Region kEdge = {"edge", {0.75}}, kPatch = {"patch", {0.75, 1 / 0.75}};
 
 // How many of the wheels' places lie on the region's floor.
-template <typename Region>
-double places_there(const std::vector<Vector2d>& places, const Region& region) {
-  return static_cast<double>(
-      std::ranges::count_if(places, [&](const Vector2d& place) { return region.has(place); }));
+double places_there(const std::vector<Vector2d>& places, const Region& region,
+                    const std::vector<FitRow>& rows, const VectorXd& values) {
+  FloorParts floor({0, 0});
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const std::string& name = rows[k].row.name;
+    const bool is_ratio = name.ends_with("_ratio");
+    if (name.starts_with(region.name + "_")) floor.put(name, is_ratio ? 2 : values[k]);
+  }
+  const RobotWheel wheel;
+  return static_cast<double>(std::ranges::count_if(places, [&](const Vector2d& place) {
+    const RobotPlace at{place};
+    return floor.under(&at, wheel) > 1.5;  // beyond the middle of the border
+  }));
 }
 
 // Whether enough of the wheels' places lie on either floor.
-template <typename Region>
-bool parts(const std::vector<Vector2d>& places, const std::vector<FitRow>& rows,
-           const VectorXd& values) {
-  const Region region(rows, values);
-  const double there = places_there(places, region), all = static_cast<double>(places.size());
-  const double fewer = std::min(there, all - there);
-  return region.may_be(places) && fewer > std::max(kLeastInside * all, kLeastPlaces);
+bool parts(const std::vector<Vector2d>& places, const Region& region,
+           const std::vector<FitRow>& rows, const VectorXd& values) {
+  if (region.ratio(rows, values) <= 0) return false;
+  // One that is larger than the log reaches is an edge.
+  const Eigen::Index radius = row_index(rows, region.name + "_radius");
+  if (radius >= 0 && values[radius] >= kLargestPatch * scatter_of(places)) return false;
+  const double there = places_there(places, region, rows, values);
+  const auto all = static_cast<double>(places.size());
+  return std::min(there, all - there) > std::max(kLeastInside * all, kLeastPlaces);
 }
 
 // Values of the best of some borders, the best of every group climbed from.  `rows` are those of
 // the fit and behind them the region's, its ratio last.
-template <typename Region>
-VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
+VectorXd best_region(const Region& region, const WindowFitter& fitter, const WindowFit& fit,
                      const std::vector<FitRow>& rows, const VectorXd& values,
                      const std::vector<Starts>& groups) {
   const std::vector<Vector2d> places = wheel_places(fitter);
@@ -142,11 +142,11 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
       if (gain > best.first) best = {gain, start};
     };
     for (VectorXd start : group) {
-      if (!parts<Region>(places, rows, start)) continue;
+      if (!parts(places, region, rows, start)) continue;
       one.values = start.head(ratio);
       offer(fitter.promise(one, slopes, rows, start), start);
       // Windows over a border are outliers of one floor, so that slopes there promise too little.
-      for (const double tried : Region::kTried) {
+      for (const double tried : region.tried) {
         start[ratio] = 1 + differs * (tried - 1);
         offer(fitter.hold(rows, start).objective - fit.objective, start);
       }
@@ -164,10 +164,10 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
       from_there[static_cast<std::size_t>(r)].row.nominal = start[r];
     }
     const WindowFit climbed = fitter.fit(from_there, {}, start, kClimbingRounds);
-    if (!parts<Region>(places, rows, climbed.values)) continue;
+    if (!parts(places, region, rows, climbed.values)) continue;
     // The robot's own values are those of the floor that most of the log was driven on, unless the
     // log distinguishes.
-    const double there = places_there(places, Region(rows, climbed.values));
+    const double there = places_there(places, region, rows, climbed.values);
     const bool own = 2 * there < static_cast<double>(places.size());
     const double likely = climbed.objective + (own ? kNotDistinguished : 0);
     if (likely <= most) continue;
@@ -180,11 +180,12 @@ VectorXd best_region(const WindowFitter& fitter, const WindowFit& fit,
 // A region gains nothing where all windows lie on one side, which is another floor; and no more
 // than it does where every run has a share of its travel of its own, too: of runs that last as
 // long, those that get beyond a line are the fast ones.
-template <typename Region>
-double gain_of_region(const WindowFitter& fitter, const WindowFit& with, const WindowFit& without) {
-  if (!parts<Region>(wheel_places(fitter), with.rows, with.values)) return 0;
-  return std::min(with.objective - without.objective,
-                  fitter.within_runs(with).objective - fitter.within_runs(without).objective);
+auto gain_of_region(const Region& region) {
+  return [&region](const WindowFitter& fitter, const WindowFit& with, const WindowFit& without) {
+    if (!parts(wheel_places(fitter), region, with.rows, with.values)) return 0.0;
+    return std::min(with.objective - without.objective,
+                    fitter.within_runs(with).objective - fitter.within_runs(without).objective);
+  };
 }
 
 VectorXd scan_lines(const WindowFitter& fitter, const WindowFit& fit,
@@ -200,7 +201,7 @@ VectorXd scan_lines(const WindowFitter& fitter, const WindowFit& fit,
       start.tail<3>() << angle, at_share(distances, share), 1;
     }
   }
-  return best_region<Line>(fitter, fit, rows, values, groups);
+  return best_region(kEdge, fitter, fit, rows, values, groups);
 }
 
 VectorXd scan_circles(const WindowFitter& fitter, const WindowFit& fit,
@@ -218,7 +219,7 @@ VectorXd scan_circles(const WindowFitter& fitter, const WindowFit& fit,
       }
     }
   }
-  return best_region<Circle>(fitter, fit, rows, values, groups);
+  return best_region(kPatch, fitter, fit, rows, values, groups);
 }
 
 // By what two floors differ: how much less far wheels travel on the other one, or how much harder,
@@ -233,34 +234,39 @@ struct Differs {
   std::string text(const Estimate& e) const {
     const double sign = std::copysign(100, e.value);
     const auto [lo, hi] = std::minmax({sign * e.lo, sign * e.hi});
-    const std::string share = fmt::format("{0:.{3}f} % [{1:.{3}f}, {2:.{3}f}]", sign * e.value, lo,
-                                          hi, throttled ? 1 : 0);
+    const std::string share =
+        with_interval(throttled ? "%.1f" : "%.0f", sign * e.value, lo, hi, "%");
     if (!throttled) return "travel " + share + (e.value < 0 ? " less far" : " farther");
     return "resist rolling by " + share + " of the weight " + (e.value > 0 ? "more" : "less");
   }
 };
 
+std::string metres_text(const Estimate& e) {
+  return with_interval("%.3f", e.value, e.lo, e.hi, "m");
+}
+
 // How much slower the slower side is, where the line passes nearest to the middle of the log, and
 // which side that is.
 void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
                          NamedEffect* effect) {
-  const Line line(fit.rows, fit.values);
   // The normal points to the slower side.
-  const bool slower_beyond = line.ratio < 1;
+  const bool slower_beyond = kEdge.ratio(fit.rows, fit.values) < 1;
   const double sign = slower_beyond ? 1 : -1, turn = slower_beyond ? 0 : std::numbers::pi;
-  const double angle = wrap_angle(line.angle + turn);
+  const double angle = wrap_angle(value_of(fit.rows, fit.values, "edge_angle") + turn);
   const Vector2d middle = fitter.windows().origin_m;
   const Differs differs{is_throttled(fitter.robot())};
   const std::vector<Estimate> found =
       derived_estimates(fitter, fit, seed, [&](const VectorXd& values) {
-        const Line at(fit.rows, values);
-        const double offset = at.offset - direction_of(at.angle).dot(middle - fitter.origin_m());
+        const double ratio = kEdge.ratio(fit.rows, values);
+        const double normal = value_of(fit.rows, values, "edge_angle");
+        const double offset = value_of(fit.rows, values, "edge_offset") -
+                              direction_of(normal).dot(middle - fitter.origin_m());
         return std::vector<Estimate>{
-            differs(slower_beyond       ? at.ratio
-                    : differs.throttled ? 2 - at.ratio
-                                        : 1 / at.ratio),
+            differs(slower_beyond       ? ratio
+                    : differs.throttled ? 2 - ratio
+                                        : 1 / ratio),
             {"offset", sign * offset, 0, 0, "m"},
-            {"angle", angle + wrap_angle(at.angle + turn - angle), 0, 0, "rad"}};
+            {"angle", angle + wrap_angle(normal + turn - angle), 0, 0, "rad"}};
       });
   const Estimate &ratio = found[0], &offset = found[1], &normal = found[2];
   // The interval of the line's place is across it.
@@ -273,43 +279,70 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
   const Estimate y = place("y", middle[1], std::sin(angle));
   effect->parameters = {ratio, x, y, normal};
   effect->text = fmt::format(
-      "The robot drives over an edge between two floors: its wheels {} beyond a line through x "
-      "{:.3f} m [{:.3f}, {:.3f}], y {:.3f} m [{:.3f}, {:.3f}] of the tracker's frame; the slower "
-      "side lies towards {:.0f} degrees [{:.0f}, {:.0f}] from its x axis.",
-      differs.text(ratio), x.value, x.lo, x.hi, y.value, y.lo, y.hi, normal.value / kDegree,
-      normal.lo / kDegree, normal.hi / kDegree);
+      "The robot drives over an edge between two floors: its wheels {} beyond a line through x {}, "
+      "y {} of the tracker's frame; the slower side lies towards {} from its x axis.",
+      differs.text(ratio), metres_text(x), metres_text(y),
+      with_interval("%.0f", normal.value / kDegree, normal.lo / kDegree, normal.hi / kDegree,
+                    "degrees"));
 }
 
 void describe_friction_patch(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
                              NamedEffect* effect) {
   const Differs differs{is_throttled(fitter.robot())};
   effect->parameters = derived_estimates(fitter, fit, seed, [&](const VectorXd& values) {
-    const Circle at(fit.rows, values);
-    const Vector2d middle = fitter.origin_m() + at.middle;
-    return std::vector<Estimate>{differs(at.ratio),
-                                 {"x", middle[0], 0, 0, "m"},
-                                 {"y", middle[1], 0, 0, "m"},
-                                 {"radius", at.radius, 0, 0, "m"}};
+    const auto of = [&](const char* name) { return value_of(fit.rows, values, name); };
+    const Vector2d& origin = fitter.origin_m();
+    return std::vector<Estimate>{differs(of("patch_ratio")),
+                                 {"x", origin[0] + of("patch_x"), 0, 0, "m"},
+                                 {"y", origin[1] + of("patch_y"), 0, 0, "m"},
+                                 {"radius", of("patch_radius"), 0, 0, "m"}};
   });
-  const auto text = [](const Estimate& e) {
-    return fmt::format("{:.3f} m [{:.3f}, {:.3f}]", e.value, e.lo, e.hi);
-  };
   const std::vector<Estimate>& e = effect->parameters;
   effect->text = fmt::format(
       "The robot drives over a patch of another floor: its wheels {} within {} of x {}, y {} of "
-      "the "
-      "tracker's frame.",
-      differs.text(e[0]), text(e[3]), text(e[1]), text(e[2]));
+      "the tracker's frame.",
+      differs.text(e[0]), metres_text(e[3]), metres_text(e[1]), metres_text(e[2]));
+}
+
+// How much farther the robot goes downhill, or how steep that is, and where it is.
+void describe_floor_tilt(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
+                         NamedEffect* effect) {
+  const Eigen::Index x = row_index(fit.rows, "downhill_x"), y = row_index(fit.rows, "downhill_y");
+  const auto downhill = [&](const Eigen::VectorXd& values) {
+    return Eigen::Vector2d(values[x] - fit.rows[x].row.nominal,
+                           values[y] - fit.rows[y].row.nominal);
+  };
+  const Eigen::Vector2d down = downhill(fit.values);
+  const bool throttled = is_throttled(fitter.robot());
+  const double angle = std::atan2(down[1], down[0]);
+  // Along what was found: lengths of vectors that are unsure are too long.
+  effect->parameters = derived_estimates(fitter, fit, seed, [&](const Eigen::VectorXd& values) {
+    const Eigen::Vector2d v = downhill(values);
+    const double way = angle + wrap_angle(std::atan2(v[1], v[0]) - angle);
+    const double along = v.dot(down) / down.norm();
+    return std::vector<Estimate>{
+        throttled ? Estimate{"angle", std::asin(std::clamp(along, -1.0, 1.0)), 0, 0, "rad"}
+                  : Estimate{"share", along, 0, 0, "-"},
+        {"direction", way, 0, 0, "rad"}};
+  });
+  const Estimate& size = effect->parameters[0];
+  const Estimate& way = effect->parameters[1];
+  const auto sized = [&](const char* unit, double scale) {
+    return with_interval("%.1f", scale * size.value, scale * size.lo, scale * size.hi, unit);
+  };
+  effect->text = fmt::format(
+      "The floor falls away towards {:.0f} degrees [{:.0f}, {:.0f}] from the tracker's x axis: {}.",
+      angle / kDegree, way.lo / kDegree, way.hi / kDegree,
+      throttled ? "by " + sized("degrees", 1 / kDegree)
+      : skids(fitter.robot())
+          ? "turns slide that way by " + sized("%", 100) + " of how far they drag the wheels"
+          : "that way the robot goes " + sized("%", 100) + " farther than its wheels roll");
 }
 
 GroundHypothesis region(const char* name, const char* alias, const char* thing,
                         std::vector<KinematicRow> freed) {
-  GroundHypothesis hypothesis;
-  hypothesis.name = name;
-  hypothesis.aliases = {alias};
-  hypothesis.thing = thing;
+  GroundHypothesis hypothesis{name, {alias}, thing, std::move(freed)};
   hypothesis.price = kPriceOfLooking;
-  hypothesis.freed = std::move(freed);
   hypothesis.of_world = true;
   hypothesis.kept = kKeptFloorShare;
   return hypothesis;
@@ -324,7 +357,7 @@ GroundHypothesis floor_edge() {
                                   {"edge_ratio", 1, 0.02, "ratio", "-"}});
   edge.describe = describe_floor_edge;
   edge.propose = scan_lines;
-  edge.gain = gain_of_region<Line>;
+  edge.gain = gain_of_region(kEdge);
   return edge;
 }
 
@@ -336,8 +369,19 @@ GroundHypothesis friction_patch() {
                                    {"patch_ratio", 1, 0.02, "ratio", "-"}});
   patch.describe = describe_friction_patch;
   patch.propose = scan_circles;
-  patch.gain = gain_of_region<Circle>;
+  patch.gain = gain_of_region(kPatch);
   return patch;
+}
+
+GroundHypothesis floor_tilt() {
+  GroundHypothesis tilt{
+      "floor_tilt",
+      {},
+      "the floor's slope",
+      {{"downhill_x", 0, kDownhillShare, "x", "-"}, {"downhill_y", 0, kDownhillShare, "y", "-"}}};
+  tilt.of_world = true;
+  tilt.describe = describe_floor_tilt;
+  return tilt;
 }
 
 }  // namespace gapfarm
