@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
@@ -227,70 +228,74 @@ Status read_useful_runs(std::span<const std::string> folders, const WindowSettin
   return set_runs(log, windows, problem);
 }
 
+namespace {
+
+void emit(const GroundWork& work, Finding finding) {
+  if (work.on_finding) work.on_finding(std::move(finding));
+}
+
+}  // namespace
+
 void emit_faults(const GroundWork& work, const GroundSearch& search) {
-  if (!work.on_finding) return;
-  Finding finding;
-  finding.about = "faults of the log";
-  finding.text = search.faults.empty()
-                     ? "Nothing of the log is the wrong way round or in another unit."
-                     : "With this put right, the log is far closer to what is expected: " +
-                           things_of(search, mapped(search.faults, &FoundFault::hypothesis)) + ".";
-  finding.text += fmt::format(" {} windows of {} stretches are held against the {}.",
-                              search.windows.trials.size(), search.windows.blocks,
-                              search.windows.simulated ? "program" : "robot's kinematics");
-  work.on_finding(std::move(finding));
+  const std::string found =
+      search.faults.empty()
+          ? "Nothing of the log is the wrong way round or in another unit."
+          : "With this put right, the log is far closer to what is expected: " +
+                things_of(search, mapped(search.faults, &FoundFault::hypothesis)) + ".";
+  emit(work, {"faults of the log",
+              found + fmt::format(" {} windows of {} stretches are held against the {}.",
+                                  search.windows.trials.size(), search.windows.blocks,
+                                  search.windows.simulated ? "program" : "robot's kinematics"),
+              {},
+              {}});
 }
 
 void emit_offers(const GroundWork& work, const GroundSearch& search,
-                 const std::vector<std::pair<Offer, WindowFit>>& tried) {
-  if (!work.on_finding) return;
-  std::vector<const Offer*> best;
-  for (const auto& [offer, fit] : tried) best.push_back(&offer);
-  std::ranges::stable_sort(best, [](const Offer* a, const Offer* b) { return a->gain > b->gain; });
+                 const std::vector<Offer>& tried) {
+  std::vector<Offer> best = tried;
+  std::ranges::stable_sort(best, std::greater(), &Offer::gain);
   // Most change nothing of what stands there.
-  if (best.size() > kMostOffersReported &&
-      best[kMostOffersReported - 1]->gain >= tried.back().first.gain &&
+  const bool more = best.size() > kMostOffersReported;
+  if (more && best[kMostOffersReported - 1].gain >= tried.back().gain &&
       tried.size() < to_try(search)) {
     return;
   }
-  Finding finding;
-  finding.about = "what the catalogue offers";
-  finding.text = fmt::format("{} of {} values tried{}; one is named from {:g} nats on.",
-                             tried.size(), to_try(search),
-                             search.steps.empty() ? "" : " beside what is named", kLeastGroundGain);
-  finding.columns = {"value", "would gain, nats"};
-  for (std::size_t i = 0; i < std::min(best.size(), kMostOffersReported); ++i) {
-    if (best[i]->gain <= 0) continue;
-    finding.rows.emplace_back(search.catalogue[best[i]->hypothesis].thing,
-                              nats_text(best[i]->gain));
+  if (more) best.resize(kMostOffersReported);
+  Finding finding{
+      "what the catalogue offers",
+      fmt::format("{} of {} values tried{}; one is named from {:g} nats on.", tried.size(),
+                  to_try(search), search.steps.empty() ? "" : " beside what is named",
+                  kLeastGroundGain),
+      {"value", "would gain, nats"},
+      {}};
+  for (const Offer& offer : best) {
+    if (offer.gain <= 0) continue;
+    finding.rows.emplace_back(search.catalogue[offer.hypothesis].thing, nats_text(offer.gain));
   }
-  work.on_finding(std::move(finding));
+  emit(work, std::move(finding));
 }
 
 void emit_steps(const GroundWork& work, const GroundSearch& search) {
-  if (!work.on_finding) return;
-  Finding finding;
-  finding.about = "what is named so far";
-  finding.columns = {"value", "gains, nats"};
+  Finding finding{"what is named so far",
+                  search.steps.empty() ? "Nothing of the catalogue is worth a name so far."
+                                       : "Better on stretches that were held out, too:",
+                  {"value", "gains, nats"},
+                  {}};
   for (const GroundStep& step : search.steps) {
-    finding.rows.emplace_back(search.catalogue[step.chosen].thing, nats_text(step.gain));
-  }
-  finding.text = search.steps.empty() ? "Nothing of the catalogue is worth a name so far."
-                                      : "Better on stretches that were held out, too:";
-  for (const GroundStep& step : search.steps) {
+    const std::string& thing = search.catalogue[step.chosen].thing;
+    finding.rows.emplace_back(thing, nats_text(step.gain));
     if (step.not_distinguished.empty()) continue;
-    finding.text += " " + search.catalogue[step.chosen].thing + " is not distinguished from " +
+    finding.text += " " + thing + " is not distinguished from " +
                     things_of(search, step.not_distinguished) + ".";
   }
-  work.on_finding(std::move(finding));
+  emit(work, std::move(finding));
 }
 
 void emit_rest(const GroundWork& work, const GroundSearch& search) {
-  if (!work.on_finding) return;
   GroundFigures figures;
   figures.closable = search.closable;
   figures.best_of_all = search.best_of_all;
-  work.on_finding({"what is left", verdict_reason(figures), {}, {}});
+  emit(work, {"what is left", verdict_reason(figures), {}, {}});
 }
 
 }  // namespace gapfarm

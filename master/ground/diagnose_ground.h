@@ -65,7 +65,7 @@ Status read_useful_runs(std::span<const std::string> folders, const WindowSettin
 void emit_faults(const GroundWork& work, const GroundSearch& search);
 // Of the step in work, as far as it has come.
 void emit_offers(const GroundWork& work, const GroundSearch& search,
-                 const std::vector<std::pair<Offer, WindowFit>>& tried);
+                 const std::vector<Offer>& tried);
 void emit_steps(const GroundWork& work, const GroundSearch& search);
 void emit_rest(const GroundWork& work, const GroundSearch& search);
 

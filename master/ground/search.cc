@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -15,9 +16,24 @@
 namespace gapfarm {
 namespace {
 
+// An offer, and how well it predicts what was not fitted: the file with what is named and this put
+// right.
+struct Candidate {
+  Offer offer;
+  WindowFit fit = {};
+  WindowFit held_out = {};
+  WindowFit before = {};  // that it is compared with
+  HeldOutGain held_out_gain = {};
+  bool moved = false;  // both with all other values moved within their tolerances
+  bool may_be_named = false;
+  bool competes = false;  // and is no trace of the names before it
+
+  double gain() const { return offer.gain; }
+};
+
 // `slopes`: of the search's fit.
-Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
-              const std::vector<Eigen::MatrixXd>& slopes, std::size_t index, WindowFit* fit) {
+Candidate try_one(const WindowFitter& fitter, const GroundSearch& search,
+                  const std::vector<Eigen::MatrixXd>& slopes, std::size_t index) {
   const GroundHypothesis& hypothesis = search.catalogue[index];
   Eigen::VectorXd values = search.fit.values;
   const std::vector<FitRow> rows = with_freed(search.fit.rows, hypothesis, &values);
@@ -25,15 +41,14 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
   if (hypothesis.propose) values = hypothesis.propose(fitter, search.fit, rows, here);
   if (values == here) {
     const double promised = fitter.promise(search.fit, slopes, rows, values);
-    if (promised < kLeastGroundPromise) return {index, std::max(promised, 0.0), {}};
+    if (promised < kLeastGroundPromise) return {{index, std::max(promised, 0.0), {}}};
   }
-  *fit = fitter.fit(rows, {}, values);
-  Offer offer{index, gain_of(fitter, hypothesis, *fit, search.fit), {}};
-  offer.values.resize(hypothesis.freed.size());
-  for (std::size_t k = 0; k < hypothesis.freed.size(); ++k) {
-    offer.values[k] = fit->values[row_index(rows, hypothesis.freed[k].name)];
-  }
-  return offer;
+  const WindowFit fit = fitter.fit(rows, {}, values);
+  return {{index, gain_of(fitter, hypothesis, fit, search.fit),
+           vector_of(
+               hypothesis.freed,
+               [&](const KinematicRow& freed) { return fit.values[row_index(rows, freed.name)]; })},
+          fit};
 }
 
 bool chosen_before(const GroundSearch& search, std::size_t index) {
@@ -56,38 +71,26 @@ double least_gain(const GroundSearch& search) {
   return least;
 }
 
-// An offer, and how well it predicts what was not fitted: the file with what is named and this put
-// right.
-struct Candidate {
-  Offer offer;
-  WindowFit fit;
-  WindowFit held_out;
-  WindowFit before;  // that it is compared with
-  HeldOutGain held_out_gain;
-  bool moved = false;  // both with all other values moved within their tolerances
-  bool may_be_named = false;
-};
-
-Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
-                           const GroundSearch& search, const Offer& offer, WindowFit fit) {
+void predict_held_out(const WindowFitter& fitter, const GroundWork& work,
+                      const GroundSearch& search, Candidate* candidate) {
   std::vector<std::size_t> hypotheses = mapped(search.steps, &GroundStep::chosen);
-  hypotheses.push_back(offer.hypothesis);
-  const WindowSet& windows = fitter.windows();
-  Candidate candidate{offer, std::move(fit), {}, search.chain.back(), {}, search.moved};
+  hypotheses.push_back(candidate->offer.hypothesis);
   const auto measure = [&](Candidate& c) {
     c.held_out = c.moved ? fit_held_out(fitter, c.fit.rows, c.fit.values)
                          : held_out_with(fitter, search, hypotheses, c.fit);
-    c.held_out_gain = held_out_gain(windows, c.held_out, c.before, work.seed);
+    c.held_out_gain = held_out_gain(fitter.windows(), c.held_out, c.before, work.seed);
   };
-  measure(candidate);
-  const bool first = offer.hypothesis == search.offers.back().front().hypothesis;
-  if (search.moved || !first || may_be_named(candidate.held_out_gain)) return candidate;
+  candidate->before = search.chain.back();
+  candidate->moved = search.moved;
+  measure(*candidate);
+  const bool first = candidate->offer.hypothesis == search.offers.back().front().hypothesis;
+  if (search.moved || !first || may_be_named(candidate->held_out_gain)) return;
   // What gains most may show only once the others have moved a little.
-  Candidate beside = candidate;
+  Candidate beside = *candidate;
   beside.moved = true;
   beside.before = fit_held_out(fitter, search.fit.rows, search.fit.values);
   measure(beside);
-  return may_be_named(beside.held_out_gain) ? beside : candidate;
+  if (may_be_named(beside.held_out_gain)) *candidate = std::move(beside);
 }
 
 // What a candidate gains, held out, in the windows where it is no trace of the names before it.
@@ -116,8 +119,8 @@ void keep_if_best(GroundSearch* search, WindowFit held_out, std::string what) {
 }
 
 void name_candidate(const WindowSet& windows, const GroundWork& work,
-                    const std::vector<Offer>& offers, const std::vector<Candidate>& candidates,
-                    const Candidate& chosen, GroundSearch* search) {
+                    const std::vector<Candidate>& candidates, const Candidate& chosen,
+                    GroundSearch* search) {
   GroundStep step{
       chosen.offer.hypothesis, chosen.offer.gain, chosen.held_out_gain, chosen.before, {}};
   const auto add = [&](std::size_t hypothesis) {
@@ -129,7 +132,7 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
     const HeldOutGain over = held_out_gain(windows, chosen.held_out, other.held_out, work.seed);
     if (over.lo <= 0 && other.may_be_named) add(other.offer.hypothesis);
   }
-  for (const Offer& offer : offers) {
+  for (const Offer& offer : search->offers.back()) {
     if (offer.values.size() > 0 && offer.gain > chosen.offer.gain - kNotDistinguished &&
         offer.gain > kNotDistinguished) {
       add(offer.hypothesis);
@@ -178,7 +181,7 @@ const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
 
 // The best of the catalogue, when it is worth its name.
 bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
-  std::vector<std::pair<Offer, WindowFit>> tried;
+  std::vector<Candidate> tried;
   const std::vector<Eigen::MatrixXd> slopes = fitter.slopes(search->fit);
   for (std::size_t i = 0; i < search->catalogue.size(); ++i) {
     if (work.stopped && work.stopped()) return false;
@@ -187,63 +190,49 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
       work.on_progress(before + i, before + search->catalogue.size());
     }
     if (search->catalogue[i].put_right || chosen_before(*search, i)) continue;
-    WindowFit fit;
-    Offer offer = try_one(fitter, *search, slopes, i, &fit);
-    tried.emplace_back(std::move(offer), std::move(fit));
-    emit_offers(work, *search, tried);
+    tried.push_back(try_one(fitter, *search, slopes, i));
+    emit_offers(work, *search, mapped(tried, &Candidate::offer));
   }
-  std::stable_sort(tried.begin(), tried.end(),
-                   [](const auto& a, const auto& b) { return a.first.gain > b.first.gain; });
-  std::vector<Offer> offers;
-  for (const auto& [offer, fit] : tried) offers.push_back(offer);
-  search->offers.push_back(offers);
+  std::ranges::stable_sort(tried, std::greater(), &Candidate::gain);
+  search->offers.push_back(mapped(tried, &Candidate::offer));
   const double least = least_gain(*search);
   const double worth = std::min(least, kLeastGroundGain);
-  while (!tried.empty() && (tried.back().first.gain < worth || tried.size() > kLeaders)) {
+  while (!tried.empty() && (tried.back().gain() < worth || tried.size() > kLeaders)) {
     tried.pop_back();
   }
   const auto shown = [&](const Candidate& c) {
     return shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit);
   };
-  std::vector<Candidate> candidates;
-  for (auto& [offer, fit] : tried) {
-    Candidate& c =
-        candidates.emplace_back(predict_held_out(fitter, work, *search, offer, std::move(fit)));
+  const bool further = !search->steps.empty();
+  for (Candidate& c : tried) {
+    predict_held_out(fitter, work, *search, &c);
     // What a log is sure enough of to close more than is tolerated needs no more, but beside a
     // name: of that others have what its form leaves.
-    const bool enough =
-        c.offer.gain >= least || (search->steps.empty() && c.held_out_gain.lo > kToleratedGap);
+    const bool enough = c.gain() >= least || (!further && c.held_out_gain.lo > kToleratedGap);
     c.may_be_named = enough && may_be_named(c.held_out_gain) && shown(c);
+    // What has a name needs no other one while what is left is tolerated.
+    c.competes = c.may_be_named && (!further || c.held_out_gain.hi > kToleratedGap) &&
+                 may_be_named(gain_beyond_traces(fitter.windows(), work, *search, c));
   }
-  std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
-    return a.held_out_gain.mean > b.held_out_gain.mean;
-  });
-  // What has a name needs no other one while what is left is tolerated.
-  const bool further = !search->steps.empty();
-  std::vector<bool> competes = mapped(candidates, [&](const Candidate& c) {
-    if (further && !(c.held_out_gain.hi > kToleratedGap)) return false;
-    return c.may_be_named && may_be_named(gain_beyond_traces(fitter.windows(), work, *search, c));
-  });
+  std::ranges::stable_sort(tried, std::greater(),
+                           [](const Candidate& c) { return c.held_out_gain.mean; });
   // Held out, values that gain far less than others do with small moves of the rest do not win.
   double most = 0;
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
-    if (competes[k]) most = std::max(most, candidates[k].offer.gain);
-  }
-  const auto chosen = std::ranges::find_if(candidates, [&](const Candidate& c) {
-    return competes[&c - candidates.data()] &&
-           (!search->reference || c.offer.gain >= kShareOfBest * most);
+  for (const Candidate& c : tried) most = std::max(most, c.competes ? c.gain() : 0);
+  const auto chosen = std::ranges::find_if(tried, [&](const Candidate& c) {
+    return c.competes && (!search->reference || c.gain() >= kShareOfBest * most);
   });
-  if (chosen == candidates.end()) {
-    const auto best = std::ranges::find_if(candidates, shown);
-    if (best != candidates.end()) {
+  if (chosen == tried.end()) {
+    const auto best = std::ranges::find_if(tried, shown);
+    if (best != tried.end()) {
       keep_if_best(search, std::move(best->held_out),
                    search->catalogue[best->offer.hypothesis].name);
     }
     return false;
   }
-  const Candidate& likeliest = likeliest_of(fitter.windows(), work, candidates, *chosen);
-  name_candidate(fitter.windows(), work, offers, candidates,
-                 simplest_of(search->catalogue, candidates, likeliest), search);
+  const Candidate& likeliest = likeliest_of(fitter.windows(), work, tried, *chosen);
+  name_candidate(fitter.windows(), work, tried, simplest_of(search->catalogue, tried, likeliest),
+                 search);
   emit_steps(work, *search);
   return true;
 }
@@ -317,6 +306,7 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   const auto stage = [&](const char* name) {
     if (work.on_stage) work.on_stage(name);
   };
+  const auto is_stopped = [&] { return work.stopped && work.stopped(); };
   const Error stopped{"stopped"};
   GroundSearch search;
   static_cast<GroundBasis&>(search) = question;
@@ -330,11 +320,11 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   const GroundNames unnamed = search;
   while (search.steps.size() < kMostNames && take_step(fitter, work, &search)) {
   }
-  if (!(work.stopped && work.stopped())) drop_again(fitter, work, unnamed, &search);
+  if (!is_stopped()) drop_again(fitter, work, unnamed, &search);
   const std::size_t stood = search.steps.size();
-  if (!(work.stopped && work.stopped())) drop_stand_ins(fitter, work, unnamed, &search);
+  if (!is_stopped()) drop_stand_ins(fitter, work, unnamed, &search);
   if (search.steps.size() != stood) drop_again(fitter, work, unnamed, &search);
-  if (work.stopped && work.stopped()) return stopped;
+  if (is_stopped()) return stopped;
   emit_steps(work, search);
   stage(kRestStage);
   measure_rest(fitter, work, &search);
@@ -347,7 +337,7 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
     as_it_is.sensor.clear();
     return search_ground(robot, log, as_it_is, work);
   }
-  if (work.stopped && work.stopped()) return stopped;
+  if (is_stopped()) return stopped;
   emit_rest(work, search);
   return search;
 }
