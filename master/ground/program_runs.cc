@@ -11,6 +11,7 @@
 
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
+#include "common/score/kinematic_body.h"
 #include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
 #include "master/infer/fit.h"
@@ -25,40 +26,30 @@ constexpr double kFar_m = 1e6;                 // where a program that diverges 
 constexpr double kReach_m = 0.3;               // of a robot whose size nobody knows
 constexpr double kChannelOffsetShare = 0.005;  // of a channel's root mean square
 constexpr double kUntuned = 0.05;  // m: a unit above it, a foot say, is what no tuning is
-constexpr const char* kMarkers[] = {"marker_x", "marker_y", "marker_yaw"};
 constexpr const char* kMarkerRows[] = {"marker.x", "marker.y", "marker.yaw"};
 // Of the kinematics' rows, those that say how a program is asked and read.
 constexpr const char* kAround[] = {"delay",      "marker_x",   "marker_y",
                                    "marker_yaw", "pose_scale", "aspect"};
 
-// What a tracker makes of a motion between two poses of the robot.
-class TrackerReading {
- public:
-  TrackerReading(const Kinematics& at, const Pose& X_RM)
-      : X_RM_{at.value_or("marker_x", X_RM.x), at.value_or("marker_y", X_RM.y),
-              at.value_or("marker_yaw", X_RM.theta)},
-        scale_(at.value_or("pose_scale", 1)),
-        aspect_(at.value_or("aspect", 1)) {}
-  Pose end(const Pose& X_WS, const Pose& X_SE) const {
-    const Pose X_true{X_WS.x / scale_, X_WS.y / scale_ / aspect_, X_WS.theta};
-    const Pose X = X_true * inverse(X_RM_) * X_SE * X_RM_;
-    return {scale_ * X.x, scale_ * aspect_ * X.y, X.theta};
-  }
-
- private:
-  Pose X_RM_;
-  double scale_, aspect_;
-};
+// As far as commands and readings go: it has no wheels.
+GroundRobot robot_of(const Problem& problem) {
+  const auto value = [&](const char* key) { return problem.values[problem.table().row(key)]; };
+  GroundRobot robot;
+  robot.name = problem.external->table.declaration().name;
+  robot.command = CommandKind::kTwist;
+  robot.channels.assign(problem.channels().begin(), problem.channels().end());
+  robot.motors.delay_s = value("delay");
+  robot.X_RM = {value(kMarkerRows[0]), value(kMarkerRows[1]), value(kMarkerRows[2])};
+  return robot;
+}
 
 // A program, asked for whole runs at many values at once.
 class ProgramFarm {
  public:
-  ProgramFarm(Farm& farm, const Problem& problem) : farm_(farm), problem_(problem) {
-    const auto value = [&](const char* key) { return problem.values[problem.table().row(key)]; };
-    X_RM_ = {value(kMarkerRows[0]), value(kMarkerRows[1]), value(kMarkerRows[2])};
-  }
+  ProgramFarm(Farm& farm, const Problem& problem)
+      : farm_(farm), problem_(problem), robot_(robot_of(problem)) {}
 
-  const Pose& X_RM() const { return X_RM_; }
+  const GroundRobot& robot() const { return robot_; }
   const Status& failure() const { return failure_; }
 
   // Of one set of windows.
@@ -114,11 +105,18 @@ class ProgramFarm {
     std::vector<std::vector<Pose>> read;
     const std::vector<Trial>& trials = asked.problem.log.trials;
     for (std::size_t k = 0; k < points.size(); ++k) {
-      const TrackerReading reading(points[k], X_RM_);
+      // What a tracker makes of the robot's motions.
+      Kinematics around;
+      for (const char* name : kAround) {
+        if (points[k].index(name) >= 0) around.add(name, points[k].value_or(name, 0));
+      }
+      const KinematicBody reading(robot_, around);
+      const Pose &X_RM = reading.robot().X_RM, X_MR = inverse(X_RM);
       std::vector<Pose>& there = read.emplace_back();
       for (std::size_t i = 0; i < trials.size(); ++i) {
         const Pose X_SE = all[k] ? between(trials[i].X_WS, (*all[k])[i]) : Pose{kFar_m, 0, 0};
-        there.push_back(reading.end(trials[i].X_WS, X_SE));
+        const Pose X_WS = reading.unobserved(trials[i].X_WS);
+        there.push_back(reading.observed(X_WS * X_MR * X_SE * X_RM));
       }
     }
     return read;
@@ -126,20 +124,9 @@ class ProgramFarm {
 
   Farm& farm_;
   const Problem& problem_;
-  Pose X_RM_;
+  GroundRobot robot_;
   Status failure_;
 };
-
-// As far as commands and readings go: it has no wheels.
-GroundRobot robot_of(const Problem& problem, const Pose& X_RM) {
-  GroundRobot robot;
-  robot.name = problem.external->table.declaration().name;
-  robot.command = CommandKind::kTwist;
-  robot.channels.assign(problem.channels().begin(), problem.channels().end());
-  robot.motors.delay_s = problem.values[problem.table().row("delay")];
-  robot.X_RM = X_RM;
-  return robot;
-}
 
 bool is_around(const KinematicRow& row) { return contains(kAround, row.name); }
 
@@ -161,8 +148,10 @@ double root_mean_square(const RunLog& log, std::size_t channel) {
 }
 
 GroundQuestion question_of_program(const Problem& problem, const GroundRobot& robot,
-                                   const std::vector<KinematicRow>& tuned, const RunLog& log) {
+                                   const std::vector<KinematicRow>& tuned, const RunLog& log,
+                                   ProgramFarm* program) {
   GroundQuestion question;
+  question.simulation = [=](const WindowSet& windows) { return program->simulation(windows); };
   question.rows = tuned;
   for (KinematicRow row : kinematic_rows(robot)) {
     if (!is_around(row)) continue;
@@ -214,9 +203,7 @@ std::vector<KinematicRow> tuned_rows(const Problem& problem, const std::vector<G
 
 void put_value(const std::string& name, double value, Problem* problem) {
   std::string key = name;
-  for (std::size_t m = 0; m < std::size(kMarkers); ++m) {
-    if (name == kMarkers[m]) key = kMarkerRows[m];
-  }
+  if (key.starts_with("marker_")) key[key.find('_')] = '.';
   const auto row = problem->table().find(key);
   if (!row) return;
   const Parameter& p = problem->table()[*row];
@@ -228,9 +215,8 @@ void put_value(const std::string& name, double value, Problem* problem) {
 Status tune_program(Farm& farm, const RunLog& log, const GroundDiagnoseOptions& options,
                     std::vector<KinematicRow>* rows, Problem* problem) {
   ProgramFarm program(farm, *problem);
-  const GroundRobot robot = robot_of(*problem, program.X_RM());
-  GroundQuestion question = question_of_program(*problem, robot, *rows, log);
-  question.simulation = [&](const WindowSet& windows) { return program.simulation(windows); };
+  const GroundRobot& robot = program.robot();
+  const GroundQuestion question = question_of_program(*problem, robot, *rows, log, &program);
   GroundSearch sound;
   static_cast<GroundBasis&>(sound) = question;
   sound.log = log;
@@ -270,9 +256,8 @@ Result<GroundDiagnosis> diagnose_program_runs(Farm& farm, const std::vector<Gene
       RETURN_IF_ERROR(tune_program(farm, log, options, &rows, problem));
     }
     ProgramFarm program(farm, *problem);
-    const GroundRobot robot = robot_of(*problem, program.X_RM());
-    GroundQuestion question = question_of_program(*problem, robot, rows, log);
-    question.simulation = [&](const WindowSet& windows) { return program.simulation(windows); };
+    const GroundRobot& robot = program.robot();
+    GroundQuestion question = question_of_program(*problem, robot, rows, log, &program);
     GroundDiagnoseOptions watched = options;
     watched.stopped = [&] { return !program.failure() || (options.stopped && options.stopped()); };
     watched.memo = nullptr;
@@ -291,7 +276,7 @@ Result<std::optional<SanityFinding>> check_program_log(Farm& farm, const Problem
                                                        const RunLog& log,
                                                        const WindowSettings& settings) {
   ProgramFarm program(farm, problem);
-  const GroundRobot robot = robot_of(problem, program.X_RM());
+  const GroundRobot& robot = program.robot();
   GroundQuestion question;
   question.catalogue = wrong_poses();
   // Of commands, but seen as well without another run of the program.
