@@ -230,25 +230,24 @@ FleetChanges find_changes(const WatchedRows& rows,
   const Shared shared = estimate_shared(fits, fleet.owned, -1);
   const VectorXd units = tolerances_of(rows);
   result.dispersion = variances.dispersion;
-  result.run_deviations = variances.between.cwiseSqrt().cwiseProduct(units);
-  result.robot_deviations = shared.between.cwiseSqrt().cwiseProduct(units);
-  result.shared = shared.mean.cwiseProduct(units);
-  result.shared_errors = shared.covariance.diagonal().cwiseSqrt().cwiseProduct(units);
-  for (const RobotFit& fit : fits) {
+  for (Index k = 0; k < p; ++k) {
+    result.shared.push_back(
+        {shared.mean[k] * units[k], std::sqrt(shared.covariance(k, k)) * units[k],
+         std::sqrt(shared.between[k]) * units[k], std::sqrt(variances.between[k]) * units[k]});
+  }
+  for (std::size_t u = 0; u < fits.size(); ++u) {
+    const RobotFit& fit = fits[u];
+    const RobotRuns& robot = fleet.robots[u];
     result.owned.emplace_back(fit.beta.head(p).cwiseProduct(units));
     result.owned_errors.emplace_back(
         fit.covariance.diagonal().head(p).cwiseSqrt().cwiseProduct(units));
-    const std::vector<double>& weights = fleet.robots[result.readings.size()].weights;
-    for (std::size_t i = 0; i < weights.size(); ++i) {
-      if (weights[i] < kOddWeight)
-        result.odd_runs.push_back({result.readings.size(), i, weights[i]});
+    for (std::size_t i = 0; i < robot.weights.size(); ++i) {
+      if (robot.weights[i] < kOddWeight) result.odd_runs.push_back({u, i, robot.weights[i]});
     }
-    result.detectable.push_back(
-        detectable_of(fleet, fleet.robots[result.readings.size()], variances, most));
+    result.detectable.push_back(detectable_of(fleet, robot, variances, most));
     result.readings.push_back(readings_of(rows, fleet, fit, result.owned.back()));
   }
-  std::vector<std::size_t> names(fits.size());
-  for (std::size_t u = 0; u < names.size(); ++u) names[u] = u;
+  std::vector<std::size_t> names = indices(fits.size());
   while (fits.size() > 2) {
     OddRobot odd = farthest_robot(fleet, fits);
     if (odd.statistic <= most.robot) break;

@@ -63,6 +63,13 @@ struct RunReading {
   double deviation = 0;
 };
 
+// What all robots share of a row, its standard error, and standard deviations from robot to robot
+// and from run to run.
+struct SharedValue {
+  double value = 0, error = 0;
+  double between_robots = 0, between_runs = 0;
+};
+
 struct WatchThresholds {
   double false_alarms = 0;    // chance of a call on robots without changes
   std::vector<double> steps;  // of each value
@@ -70,10 +77,8 @@ struct WatchThresholds {
 };
 
 struct FleetChanges {
-  double dispersion = 1;  // of the runs' own covariances
-  // One a row: standard deviations from run to run and from robot to robot, what all share and its
-  // standard error.
-  Eigen::VectorXd run_deviations, robot_deviations, shared, shared_errors;
+  double dispersion = 1;            // of the runs' own covariances
+  std::vector<SharedValue> shared;  // one a row
   WatchThresholds thresholds;
   // Of each robot one a row: what it owns, before its first step, and its standard errors.
   std::vector<Eigen::VectorXd> owned, owned_errors;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <tuple>
 #include <utility>
 
@@ -19,10 +20,7 @@ constexpr double kCovered = 0.9;
 
 // The smallest span of runs that holds these shares' 90 % best.
 std::pair<std::size_t, std::size_t> span_of(const std::vector<double>& shares) {
-  std::vector<std::size_t> order(shares.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return shares[a] > shares[b]; });
+  const std::vector<std::size_t> order = order_of(shares, std::greater());
   std::pair<std::size_t, std::size_t> span = {order[0], order[0]};
   double held = 0;
   for (const std::size_t i : order) {

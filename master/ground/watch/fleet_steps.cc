@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/ranges.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm {
@@ -25,11 +26,10 @@ std::vector<StepCandidate> steps_in(const ScaledFleet& fleet, const RunVariances
   std::vector<StepCandidate> best(fleet.directions.size());
   for (std::size_t k = 0; k < best.size(); ++k) best[k].value = k;
   std::vector<std::vector<std::vector<StepScore>>> stay;
-  std::vector<std::size_t> all;
-  for (std::size_t u = 0; u < fleet.robots.size(); ++u) {
+  const std::vector<std::size_t> all = indices(fleet.robots.size());
+  for (const std::size_t u : all) {
     const RobotRuns& robot = fleet.robots[u];
     const RobotFit fit = fit_robot(robot, variances);
-    all.push_back(u);
     for (const std::size_t length : lengths_of(fit.residuals.size())) {
       auto scores = score_steps(fit, robot, fleet.directions, length);
       for (std::size_t k = 0; k < scores.size(); ++k) {

@@ -19,11 +19,10 @@ namespace {
 
 constexpr double kShownShare = 0.05;  // of other values that a change may be of
 
-std::string change_text(const WatchedValue& value, double change, double lo, double hi) {
-  if (value.unit == "-") {
-    return fmt::format("{:+.2f} % [{:+.2f}, {:+.2f}]", 100 * change, 100 * lo, 100 * hi);
-  }
-  return fmt::format("{:+.4g} [{:+.4g}, {:+.4g}] {}", change, lo, hi, value.unit);
+template <class Change>
+std::string change_text(const WatchedValue& value, const Change& of) {
+  return value.unit == "-" ? with_interval("%+.2f", 100 * of.change, 100 * of.lo, 100 * of.hi, "%")
+                           : with_interval("%+.4g", of.change, of.lo, of.hi) + " " + value.unit;
 }
 
 std::string names_of(const WatchedFleet& fleet, const std::vector<std::size_t>& robots) {
@@ -47,14 +46,13 @@ std::vector<Line> finding_lines(const WatchedFleet& fleet, const FleetChanges& c
     }
     lines.push_back({names_of(fleet, step.robots), robot.runs[step.onset],
                      robot.runs[step.onset_first] + " to " + robot.runs[step.onset_last], what,
-                     change_text(value, step.change, step.lo, step.hi),
+                     change_text(value, step),
                      fmt::format("{:.0f} %", 100 * step.shares[step.value])});
   }
   for (const OddRobot& odd : changes.odd_robots) {
     const WatchedValue& value = fleet.rows.values[odd.value];
     lines.push_back({fleet.robots[odd.robot].name, "the first", "",
-                     value.thing + ", from the others'",
-                     change_text(value, odd.change, odd.lo, odd.hi), ""});
+                     value.thing + ", from the others'", change_text(value, odd), ""});
   }
   return lines;
 }
@@ -184,12 +182,11 @@ Json steps_json(const WatchedFleet& fleet, const FleetChanges& changes) {
 Json shared_json(const WatchedFleet& fleet, const FleetChanges& changes) {
   Json shared = Json::object();
   for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    shared[fleet.rows.rows[k].name] = {{"value", changes.shared[i]},
-                                       {"error", changes.shared_errors[i]},
-                                       {"between_robots", changes.robot_deviations[i]},
-                                       {"between_runs", changes.run_deviations[i]},
-                                       {"unit", fleet.rows.rows[k].unit}};
+    Json& to = shared[fleet.rows.rows[k].name];
+    to = FieldWriter::written(changes.shared[k], [](auto& v, auto& row) {
+      FIELDS(value, error, between_robots, between_runs);
+    });
+    to["unit"] = fleet.rows.rows[k].unit;
   }
   return shared;
 }
@@ -264,8 +261,7 @@ std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
   page.paragraph(
       "Each run's value with its 90 % interval, all other values as the robot's own. An interval "
       "holds what differs from run to run; how unsure the robot's own values are (watch.json: "
-      "error) "
-      "moves all its runs alike and is not in it.");
+      "error) moves all its runs alike and is not in it.");
   // What changed first.
   std::vector<std::size_t> order = mapped(changes.steps, &ValueStep::value);
   for (const OddRobot& odd : changes.odd_robots) order.push_back(odd.value);
@@ -279,10 +275,11 @@ std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
   page.heading("What all share, and by how much robots and runs differ");
   std::vector<Line> rows;
   for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
-    rows.push_back({fleet.rows.rows[k].name, fmt::format("{:.5g}", changes.shared[k]),
-                    fmt::format("{:.2g}", changes.shared_errors[k]),
-                    fmt::format("{:.2g}", changes.robot_deviations[k]),
-                    fmt::format("{:.2g}", changes.run_deviations[k]), fleet.rows.rows[k].unit});
+    const SharedValue& of = changes.shared[k];
+    const auto short_text = [](double number) { return fmt::format("{:.2g}", number); };
+    rows.push_back({fleet.rows.rows[k].name, fmt::format("{:.5g}", of.value), short_text(of.error),
+                    short_text(of.between_robots), short_text(of.between_runs),
+                    fleet.rows.rows[k].unit});
   }
   page.table(
       {"value", "shared", "standard error", "from robot to robot", "from run to run", "unit"},
