@@ -269,35 +269,27 @@ std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search)
   const std::size_t runs = windows.run_blocks.size();
   const Eigen::Index delay = row_index(fit.rows, "delay");
   if (runs < 2 || runs > kMostRuns || delay < 0) return {};
-  const std::vector<std::size_t>& run = windows.run_of;
-  std::vector<double> best(runs, kNeverSo), at_s(runs, 0.0), counts(runs, 0.0);
-  for (const std::size_t r : run) counts[r] += 1;
-  double common = kNeverSo;
-  for (int step = -kClockSteps; step <= kClockSteps; ++step) {
+  Eigen::MatrixXd nats = Eigen::MatrixXd::Zero(runs, 2 * kClockSteps + 1);
+  const auto delay_at = [&](Eigen::Index step) {
+    return fit.values[delay] + kClockStep_s * static_cast<double>(step - kClockSteps);
+  };
+  for (Eigen::Index step = 0; step < nats.cols(); ++step) {
     Eigen::VectorXd values = fit.values;
-    values[delay] += kClockStep_s * step;
+    values[delay] = delay_at(step);
     const WindowFit held = fitter.hold(fit.rows, values);
-    std::vector<double> nats(runs, 0.0);
-    double all = 0;
-    for (std::size_t i = 0; i < run.size(); ++i) {
-      nats[run[i]] += held.nats[i] / windows.lengths;
-      all += held.nats[i] / windows.lengths;
-    }
-    common = std::max(common, all);
-    for (std::size_t r = 0; r < runs; ++r) {
-      if (nats[r] <= best[r]) continue;
-      best[r] = nats[r];
-      at_s[r] = values[delay];
+    for (std::size_t i = 0; i < held.nats.size(); ++i) {
+      nats(windows.run_of[i], step) += held.nats[i] / windows.lengths;
     }
   }
+  const double common = nats.colwise().sum().maxCoeff();
   std::vector<std::string> clocks;
   double own = 0;
   for (std::size_t r = 0; r < runs; ++r) {
-    if (counts[r] == 0) continue;
-    const double shift_s = std::abs(at_s[r] - fit.values[delay]);
-    if (shift_s > kClockStep_s * (kClockSteps - 0.5)) return {};  // no clock within reach
-    clocks.push_back(fmt::format("{:+.2f} s in run {}", at_s[r], search.log.runs[r].run));
-    own += best[r];
+    if (!contains(windows.run_of, r)) continue;
+    Eigen::Index best = 0;
+    own += nats.row(r).maxCoeff(&best);
+    if (best == 0 || best + 1 == nats.cols()) return {};  // no clock within reach
+    clocks.push_back(fmt::format("{:+.2f} s in run {}", delay_at(best), search.log.runs[r].run));
   }
   const double least = kLeastChangeGain * (static_cast<double>(clocks.size()) - 1);
   return clocks.size() < 2 || own - common < least ? "" : joined(clocks);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/base/text.h"
 #include "common/math/algebra.h"
 #include "common/random/stream.h"
 #include "common/robot/robot_drive.h"
@@ -83,7 +84,7 @@ double lost(double commanded, double fastest) {
 }
 
 // Gain and loss (rad/s) of measured = gain commanded - loss sign(commanded); each block counts
-// `times` (empty: once).
+// `times`.
 Eigen::Vector2d fit_loop(const LoopWindows& windows, const std::vector<double>& times) {
   const double loose = kLooseLoss * windows.fastest;
   // One speed's error in units of the fastest: priors only keep the equations sound.
@@ -93,7 +94,7 @@ Eigen::Vector2d fit_loop(const LoopWindows& windows, const std::vector<double>& 
   Eigen::Vector2d b(1 / (kLooseGain * kLooseGain), 0);
   for (const LoopWindow& w : windows.all) {
     const Eigen::Vector2d x(w.commanded, -lost(w.commanded, windows.fastest));
-    const double use = weight * (times.empty() ? 1 : times[w.block]);
+    const double use = weight * times[w.block];
     A += use * x * x.transpose();
     b += use * w.measured * x;
   }
@@ -108,7 +109,7 @@ Shares shares_of(const LoopWindows& windows, const std::vector<double>& times,
                  const Eigen::Vector2d& loop, double fastest) {
   double ran = 0, expected = 0, commanded = 0;
   for (const LoopWindow& w : windows.all) {
-    const double use = times.empty() ? 1 : times[w.block];
+    const double use = times[w.block];
     const double sign = w.commanded < 0 ? -1 : 1;
     ran += use * sign * w.measured;
     expected += use * sign * (loop[0] * w.commanded - loop[1] * lost(w.commanded, fastest));
@@ -165,7 +166,8 @@ WheelLoop measure_wheel_loop(const GroundRobot& robot, const RunLog& log, const 
     return compare ? fit_loop(there, times) : Eigen::Vector2d(1, 0);
   };
   const double fastest = compare ? there.fastest : here.fastest;
-  const auto [share, expected] = shares_of(here, {}, loop_of({}), fastest);
+  const auto once = [](const LoopWindows& of) { return std::vector<double>(of.blocks, 1.0); };
+  const auto [share, expected] = shares_of(here, once(here), loop_of(once(there)), fastest);
   Stream stream({seed, Purpose::kStatistics, 3, 0, 0});
   double sum = 0, squares = 0;
   for (int d = 0; d < kDraws; ++d) {
@@ -191,10 +193,12 @@ void report_wheel_loop(const WheelLoop& loop, bool against_reference, Diagnosis*
       against_reference
           ? fmt::format(
                 "the wheels run at {:.0f} % of their set speed, where the reference's loop would "
-                "at {:.0f} % ({:+.0f} % [{:+.0f}, {:+.0f}])",
-                100 * loop.share, 100 * loop.expected, 100 * c.value, 100 * c.lo, 100 * c.hi)
-          : fmt::format("the wheels run at {:.0f} % [{:.0f}, {:.0f}] of their set speed",
-                        100 * loop.share, 100 * (1 + c.lo), 100 * (1 + c.hi));
+                "at {:.0f} % ({})",
+                100 * loop.share, 100 * loop.expected,
+                with_interval("%+.0f", 100 * c.value, 100 * c.lo, 100 * c.hi, "%"))
+          : "the wheels run at " +
+                with_interval("%.0f", 100 * loop.share, 100 * (1 + c.lo), 100 * (1 + c.hi), "%") +
+                " of their set speed";
   if (loop.gain < kLeastChangeGain) {
     diagnosis->cautions.push_back(
         "From command to wheel nothing is off by more than a loop is by itself: " + speeds + ".");

@@ -115,8 +115,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.closed_hi = closed.hi;
   // What was gained over what would just have been worth a name.
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
-  effect.text = search_.reference ? text_of_change(robot_, h, effect) + "."
-                                  : text_of_value(robot_, h, effect);
+  effect.text = text_of_values(robot_, h, effect, search_.reference.has_value());
   if (h.describe) h.describe(fitter_, search_.fit, options_.seed, &effect);
   return effect;
 }

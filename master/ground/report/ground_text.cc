@@ -20,8 +20,9 @@ namespace {
 // The value to paste into the robot's file.
 std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Estimate& e) {
   const auto ratio = [&](const std::string& word, double own, const char* unit) {
-    return fmt::format("{} {:.5g} [{:.5g}, {:.5g}]{}; the file has {:.5g}", word,
-                       own * (1 + e.value), own * (1 + e.lo), own * (1 + e.hi), unit, own);
+    return fmt::format(
+        "{} {}{}; the file has {:.5g}", word,
+        with_interval("%.5g", own * (1 + e.value), own * (1 + e.lo), own * (1 + e.hi)), unit, own);
   };
   const auto& k = robot.controller;
   const double base = row.nominal;
@@ -36,12 +37,12 @@ std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Est
     return ratio("wheel_separation", *k.wheel_separation_m, " m");
   }
   if (e.key == "ratio" || e.key == "rate") {
-    return fmt::format("{:+.4g} [{:+.4g}, {:+.4g}] {}", e.value, e.lo, e.hi,
-                       e.unit == "-" ? "of what the file has" : e.unit);
+    return with_interval("%+.4g", e.value, e.lo, e.hi) + " " +
+           (e.unit == "-" ? "of what the file has" : e.unit);
   }
-  return fmt::format("{} {:.5g} [{:.5g}, {:.5g}] {}; the {} has {:.5g}", row.name, base + e.value,
-                     base + e.lo, base + e.hi, e.unit, robot.wheels.empty() ? "config" : "file",
-                     base);
+  return fmt::format("{} {} {}; the {} has {:.5g}", row.name,
+                     with_interval("%.5g", base + e.value, base + e.lo, base + e.hi), e.unit,
+                     robot.wheels.empty() ? "config" : "file", base);
 }
 
 std::string capital(std::string text) {
@@ -52,10 +53,9 @@ std::string capital(std::string text) {
 // Shares of what the reference has, in per cent, with a word for their sign.
 std::string share_text(double value, double lo, double hi) {
   const double sign = value < 0 ? -100 : 100;
-  const double a = std::min(sign * lo, sign * hi), b = std::max(sign * lo, sign * hi);
-  const int digits = std::abs(100 * value) < 10 ? 1 : 0;
-  return fmt::format("{} by {:.{}f} % [{:.{}f}, {:.{}f}]", value < 0 ? "fell" : "rose",
-                     sign * value, digits, a, digits, b, digits);
+  const auto [a, b] = std::minmax({sign * lo, sign * hi});
+  return std::string(value < 0 ? "fell" : "rose") + " by " +
+         with_interval(std::abs(100 * value) < 10 ? "%.1f" : "%.0f", sign * value, a, b, "%");
 }
 
 // The value of the robot's file, or of the floor, that a ratio is of; 0: none.
@@ -86,8 +86,9 @@ std::string change_text(const GroundRobot& robot, const KinematicRow& row, const
     if (from > 0) text += fmt::format(", from {:.4g} to {:.4g}", from, from * (1 + e.value / of));
     return text;
   }
-  return fmt::format("changed by {:+.4g} [{:+.4g}, {:+.4g}] {}, from {:.4g} to {:.4g}", e.value,
-                     e.lo, e.hi, e.unit, row.nominal, row.nominal + e.value);
+  return fmt::format("changed by {} {}, from {:.4g} to {:.4g}",
+                     with_interval("%+.4g", e.value, e.lo, e.hi), e.unit, row.nominal,
+                     row.nominal + e.value);
 }
 
 constexpr double kSensorSure = 0.99;  // outside its interval by far
@@ -119,13 +120,18 @@ const char* nothing_wrong(const GroundRobot& robot) {
                "are.";
 }
 
-std::string text_of_value(const GroundRobot& robot, const GroundHypothesis& h,
-                          const NamedEffect& effect) {
-  std::string text = h.thing + " is off: ";
+std::string text_of_values(const GroundRobot& robot, const GroundHypothesis& h,
+                           const NamedEffect& effect, bool changed) {
+  std::vector<std::string> values;
   for (std::size_t k = 0; k < h.freed.size() && k < effect.parameters.size(); ++k) {
-    text += (k > 0 ? "; " : "") + in_file(robot, h.freed[k], effect.parameters[k]);
+    const KinematicRow& row = h.freed[k];
+    const Estimate& e = effect.parameters[k];
+    if (!changed) values.push_back(in_file(robot, row, e));
+    if (!changed || row.name == "grip_shape") continue;  // a word for it is nobody's
+    const std::string which = h.freed.size() > 1 ? spoken(row) : "";
+    values.push_back(which + (which.empty() ? "" : " ") + change_text(robot, row, e));
   }
-  return capital(text + ".");
+  return capital(h.thing + (changed ? " " : " is off: ") + joined(values, "; ") + ".");
 }
 
 int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis) {
@@ -137,10 +143,10 @@ int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis) 
   for (const SensorValue& v : sensor) {
     const auto& [lo, hi] = v.interval;
     const std::string key = "marker." + v.row.name.substr(v.row.name.find('_') + 1);
-    const std::string text = v.shown
-                                 ? fmt::format("{} {:.4g} [{:.4g}, {:.4g}] {}; the file has {:.4g}",
-                                               key, v.value, lo, hi, v.row.unit, v.had)
-                                 : key + ": this log does not show it";
+    const std::string text =
+        v.shown ? fmt::format("{} {} {}; the file has {:.4g}", key,
+                              with_interval("%.4g", v.value, lo, hi), v.row.unit, v.had)
+                : key + ": this log does not show it";
     pose += " " + text + ".";
     const double off = v.value - v.had;
     if (!v.shown) continue;
@@ -161,19 +167,6 @@ int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis) 
     ++off;
   }
   return off;
-}
-
-std::string text_of_change(const GroundRobot& robot, const GroundHypothesis& h,
-                           const NamedEffect& effect) {
-  std::string text = h.thing + " ";
-  for (std::size_t k = 0; k < h.freed.size() && k < effect.parameters.size(); ++k) {
-    if (h.freed[k].name == "grip_shape") continue;  // a word for it is nobody's
-    const bool several = h.freed.size() > 1;
-    const std::string which = several ? spoken(h.freed[k]) : "";
-    text += (k > 0 ? "; " : "") + which + (which.empty() ? "" : " ") +
-            change_text(robot, h.freed[k], effect.parameters[k]);
-  }
-  return capital(text);
 }
 
 bool may_be_named(const HeldOutGain& gain) { return std::isfinite(gain.lo) && gain.lo > 0; }
@@ -199,8 +192,7 @@ Verdict ground_verdict(const GroundFigures& figures) {
 
 std::string verdict_reason(const GroundFigures& figures) {
   const HeldOutGain& left = figures.closable;
-  const std::string closes =
-      fmt::format("{:.2g} [{:.2g}, {:.2g}] nats a window", left.mean, left.lo, left.hi);
+  const std::string closes = with_interval("%.2g", left.mean, left.lo, left.hi) + " nats a window";
   if (nothing_is_left(figures)) {
     return fmt::format(
         "All that was tried would close another {} on stretches that were not fitted: within "
@@ -280,8 +272,9 @@ std::string further_values(const GroundSearch& search, const std::vector<Reporte
     const bool sensed = std::ranges::any_of(
         search.sensor, [&](const SensorValue& of) { return of.row.name == v.name; });
     if (!v.named || search.fit.rows[j].free || sensed) continue;
-    sure.push_back(fmt::format("{} {:.4g} [{:.4g}, {:.4g}] in place of {:.4g}", v.name, v.reported,
-                               v.interval.lower, v.interval.upper, v.had));
+    sure.push_back(
+        fmt::format("{} {} in place of {:.4g}", v.name,
+                    with_interval("%.4g", v.reported, v.interval.lower, v.interval.upper), v.had));
   }
   return sure.empty() ? ""
                       : "robot.toml has what else these runs are sure of: " + joined(sure) + ".";

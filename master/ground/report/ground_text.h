@@ -21,17 +21,13 @@ const char* source_of(const GroundRobot& robot);
 const char* nothing_wrong(const GroundRobot& robot);
 
 // "The distance between the sides, as they roll, is off: wheel_separation 0.52 [...] m; the file
-// has 0.5", a full sentence.
-std::string text_of_value(const GroundRobot& robot, const GroundHypothesis& h,
-                          const NamedEffect& effect);
+// has 0.5."; changed: "Friction across the wheels fell by 38 % [33, 43], from 0.71 to 0.44."
+std::string text_of_values(const GroundRobot& robot, const GroundHypothesis& h,
+                           const NamedEffect& effect, bool changed);
 
 // The pose of a sensor that sees increments: a caution with all of it, and effects where the file's
 // is off by more than twice its tolerance and lies outside the interval.  Returns how many.
 int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis);
-
-// "Friction across the wheels fell by 38 % [33, 43], from 0.71 to 0.44", without a full stop.
-std::string text_of_change(const GroundRobot& robot, const GroundHypothesis& h,
-                           const NamedEffect& effect);
 
 // The verdict of a ground robot's diagnosis: a function of the figures that the report prints, and
 // of nothing else.

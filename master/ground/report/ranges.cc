@@ -193,8 +193,8 @@ Json ranges_json(const Ranges& ranges) {
       if (models && !place.empty()) row[tool] = place;
       if (!models || place.empty()) none->push_back(name);
     };
-    put("mujoco", mujoco_place(name), &not_in_mujoco);
-    put("sdf", sdf_place(name), &not_in_sdf);
+    put("mujoco", simulator_place(name).mujoco, &not_in_mujoco);
+    put("sdf", simulator_place(name).sdf, &not_in_sdf);
     return row;
   };
   Json values = Json::array(), held = Json::array(), scatter = Json::array();
@@ -232,9 +232,8 @@ Json ranges_json(const Ranges& ranges) {
 std::string ranges_toml(const Json& ranges) {
   std::string text, tables;
   for (const auto& [key, value] : ranges.items()) {
-    if (value.is_array() && value.empty() && key != "logs") {
-      if (!key.starts_with("not_in")) continue;
-    }
+    const bool says_none = key == "logs" || key.starts_with("not_in");
+    if (value.is_array() && value.empty() && !says_none) continue;
     if (!is_table(value)) {
       text += key + " = " + json_text(value) + "\n";
       continue;
@@ -276,7 +275,7 @@ std::string ranges_table(const Ranges& ranges) {
                         ranges.robot ? number(v.error, 2) : "-",
                         ranges.robot ? number(v.varies, 2) : "-",
                         fmt::format("[{:.4g}, {:.4g}]", v.interval.lower, v.interval.upper),
-                        place(mujoco_place(v.name)), place(sdf_place(v.name)));
+                        place(simulator_place(v.name).mujoco), place(simulator_place(v.name).sdf));
     text += v.shown ? "\n" : "; this log does not show it: as wide as is plausible\n";
   }
   for (const WindowScatter& s : ranges.scatter) {

@@ -11,9 +11,6 @@
 namespace gapfarm {
 namespace {
 
-struct SimulatorPlace {
-  std::string_view value, mujoco, sdf;
-};
 constexpr SimulatorPlace kPlaces[] = {
     {"left_wheel_radius", "geom left_wheel: size", "collision left_wheel: radius"},
     {"right_wheel_radius", "geom right_wheel: size", "collision right_wheel: radius"},
@@ -96,14 +93,9 @@ std::string actuator(const char* side, double lag_s, double kv) {
 
 }  // namespace
 
-std::string_view mujoco_place(std::string_view value) {
+SimulatorPlace simulator_place(std::string_view value) {
   const SimulatorPlace* place = find_by(kPlaces, value, &SimulatorPlace::value);
-  return place == nullptr ? std::string_view() : place->mujoco;
-}
-
-std::string_view sdf_place(std::string_view value) {
-  const SimulatorPlace* place = find_by(kPlaces, value, &SimulatorPlace::value);
-  return place == nullptr ? std::string_view() : place->sdf;
+  return place == nullptr ? SimulatorPlace() : *place;
 }
 
 bool has_simulator_model(const GroundRobot& robot) {

@@ -11,8 +11,10 @@
 namespace gapfarm {
 
 // Where a value of Ranges stands in either model; empty: it has no place there.
-std::string_view mujoco_place(std::string_view value);
-std::string_view sdf_place(std::string_view value);
+struct SimulatorPlace {
+  std::string_view value, mujoco, sdf;
+};
+SimulatorPlace simulator_place(std::string_view value);
 
 // Whether there is such a model of the robot: two sides whose radii and separation are known.
 bool has_simulator_model(const GroundRobot& robot);

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
+#include "common/base/ranges.h"
 #include "common/math/laws.h"
+#include "common/math/statistics.h"
 #include "master/ground/report/ground_text.h"
 
 namespace gapfarm {
@@ -16,7 +19,7 @@ struct ComponentGap {
   double nats = 0;                    // over all windows
   std::vector<double> by_horizon;     // nats
   std::vector<double> half = {0, 0};  // of the log's time
-  double offset = 0, squares = 0, count = 0;
+  std::vector<double> missed;         // by the longest windows
 };
 
 Where finding_of(const ComponentGap& gap, int component, double all, const WindowSet& windows) {
@@ -27,14 +30,14 @@ Where finding_of(const ComponentGap& gap, int component, double all, const Windo
   w.component = kNames[component];
   const auto longest = std::max_element(gap.by_horizon.begin(), gap.by_horizon.end());
   w.command = windows.length_text(static_cast<int>(longest - gap.by_horizon.begin()));
-  const double mean = gap.offset / std::max(1.0, gap.count);
-  const double error =
-      std::sqrt(std::max(gap.squares / std::max(1.0, gap.count) - mean * mean, 1e-18) /
-                std::max(1.0, gap.count));
-  const bool biased = std::abs(mean) > 2 * error;
+  const double middle = mean(gap.missed);
+  const double square = mean(mapped(gap.missed, [](double m) { return m * m; }));
+  const double count = std::max(1.0, static_cast<double>(gap.missed.size()));
+  const double error = std::sqrt(std::max(square - middle * middle, 1e-18) / count);
+  const bool biased = std::abs(middle) > 2 * error;
   w.kind = biased ? "bias" : "spread";
-  w.p = biased ? std::min(1.0, 2 * normal_above(std::abs(mean) / error)) : 1;
-  w.size = 1e3 * (biased ? mean : std::sqrt(gap.squares / std::max(1.0, gap.count)));
+  w.p = biased ? std::min(1.0, 2 * normal_above(std::abs(middle) / error)) : 1;
+  w.size = 1e3 * (biased ? middle : std::sqrt(square));
   w.share = gap.nats / all;
   const double later = gap.half[1] / std::max(gap.half[0] + gap.half[1], 1e-12);
   if (later > 0.75 || later < 0.25) w.covariate = "time";
@@ -53,11 +56,8 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
   const WindowSet& windows = search.windows;
   const std::vector<Eigen::Vector3d> raw = fitter.raw_residuals(now);
   std::array<ComponentGap, 3> gaps;
-  double begin = 1e300, end = -1e300;
-  for (const Trial& trial : windows.trials) {
-    begin = std::min(begin, *trial.t_s);
-    end = std::max(end, *trial.t_s);
-  }
+  const auto [begin, end] =
+      std::ranges::minmax(mapped(windows.trials, [](const Trial& t) { return *t.t_s; }));
   for (int c = 0; c < 3; ++c) {
     ComponentGap& gap = gaps[c];
     gap.by_horizon.assign(windows.horizons, 0.0);
@@ -68,10 +68,7 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
       gap.nats += gained;
       gap.by_horizon[h] += gained;
       gap.half[2 * *windows.trials[i].t_s > begin + end ? 1 : 0] += std::max(0.0, gained);
-      if (windows.horizon[i] + 1 != windows.lengths) continue;
-      gap.offset += raw[i][c];
-      gap.squares += raw[i][c] * raw[i][c];
-      gap.count += 1;
+      if (windows.horizon[i] + 1 == windows.lengths) gap.missed.push_back(raw[i][c]);
     }
   }
   double all = 0;
@@ -82,8 +79,7 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
     if (gap.nats < kLeastShareOfGap * all) continue;
     found.push_back(finding_of(gap, c, all, windows));
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Where& a, const Where& b) { return a.share > b.share; });
+  std::ranges::stable_sort(found, std::greater(), &Where::share);
   if (search.smooth && !found.empty()) {
     found.front().covariate = search.smooth->covariate;
     found.front().text += " It varies with this: " + search.smooth->covariate + ".";
