@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -215,20 +214,25 @@ double plausible_error(const KinematicRow& row) {
   return kPlausibleTolerances * row.tolerance;
 }
 
-std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
+namespace {
+
+// What a well-kept file is off by, or what a robot changes by from log to log: whatever is a size
+// stays, and what the floor or hands change is asked for.
+std::vector<KinematicRow> rows_of(const GroundRobot& robot, bool changes) {
+  const auto sd = [&](double of_file, double kept) { return changes ? kept : of_file; };
   std::vector<KinematicRow> rows;
   const double reach = reach_of(robot);
   if (is_holonomic(robot)) {
-    rows = {{"ahead", 1, kGainShare, "ratio", "-"},
-            {"aside", 1, kGainShare, "ratio", "-"},
-            {"turn", 1, kGainShare, "ratio", "-"},
-            {"traction", 1, kGainShare, "ratio", "-"},
+    rows = {{"ahead", 1, sd(kGainShare, kSlipShare), "ratio", "-"},
+            {"aside", 1, sd(kGainShare, kKeptTurnShare), "ratio", "-"},
+            {"turn", 1, sd(kGainShare, kKeptTurnShare), "ratio", "-"},
+            {"traction", 1, sd(kGainShare, kKeptTractionShare), "ratio", "-"},
             {"load_x", robot.com_x_m.value_or(0), kLoadShare * reach, "x", "m", false, reach},
             {"load_y", robot.com_y_m.value_or(0), kLoadShare * reach, "y", "m", false, reach}};
   } else if (is_steered(robot)) {
     const double slow = robot.steering.understeer_s2_m2;
     rows = {{"steering_offset", 0, kSteering_rad, "angle", "rad"},
-            {"steering_gain", 1, kSteeringGainShare, "ratio", "-"},
+            {"steering_gain", 1, sd(kSteeringGainShare, kKeptTurnShare), "ratio", "-"},
             {"understeer", slow, 0.01 + 0.2 * slow, "understeer", "s^2/m^2"}};
     if (is_throttled(robot)) {
       const RobotThrottle& t = robot.throttle;
@@ -242,44 +246,35 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
       put("coulomb", t.coulomb, 0.02, "m/s^2");
       put("cornering", t.cornering, 0.02, "-");
     } else {
-      rows.push_back({"ahead", 1, kRadiusShare, "ratio", "-"});
+      rows.push_back({"ahead", 1, sd(kRadiusShare, kSlipShare), "ratio", "-"});
     }
   } else {
-    const double radius = skids(robot) ? kSkidRadiusShare : kRadiusShare;
-    const double separation = skids(robot) ? kSkidSeparationShare : kSeparationShare;
+    const double radius = sd(skids(robot) ? kSkidRadiusShare : kRadiusShare, kSlipShare);
+    const double apart = skids(robot) ? kSkidSeparationShare : kSeparationShare;
     rows = {{"left", 1, radius, "ratio", "-"},
             {"right", 1, radius, "ratio", "-"},
-            {"separation", 1, separation, "ratio", "-"}};
+            {"separation", 1, sd(apart, kKeptTurnShare), "ratio", "-"}};
   }
-  const bool car = robot.drive == DriveKind::kAckermann;
-  const double marker = (car ? kCarMarkerShare : kMarkerShare) * reach;
+  const bool slips = robot.drive == DriveKind::kAckermann && !changes;
+  const double marker = (slips ? kCarMarkerShare : kMarkerShare) * reach;
+  const double yaw = slips ? kCarMarkerYaw_rad : kMarkerYaw_rad;
   const Pose& X = robot.X_RM;
   rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s", true});
   rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
   rows.push_back({"marker_x", X.x, marker, "x", "m"});
   rows.push_back({"marker_y", X.y, marker, "y", "m"});
-  rows.push_back({"marker_yaw", X.theta, car ? kCarMarkerYaw_rad : kMarkerYaw_rad, "angle", "rad"});
+  rows.push_back({"marker_yaw", X.theta, yaw, "angle", "rad"});
   return rows;
 }
 
+}  // namespace
+
+std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
+  return rows_of(robot, /*changes=*/false);
+}
+
 std::vector<KinematicRow> change_rows(const GroundRobot& robot) {
-  // Whatever is a size stays: what the floor or hands change is asked for.
-  const std::map<std::string, double> kept = {{"left", kSlipShare},
-                                              {"right", kSlipShare},
-                                              {"ahead", kSlipShare},
-                                              {"separation", kKeptTurnShare},
-                                              {"aside", kKeptTurnShare},
-                                              {"turn", kKeptTurnShare},
-                                              {"traction", kKeptTractionShare},
-                                              {"steering_gain", kKeptTurnShare}};
-  std::vector<KinematicRow> rows = kinematic_rows(robot);
-  for (KinematicRow& row : rows) {
-    if (const auto found = kept.find(row.name); found != kept.end()) row.tolerance = found->second;
-    if (row.name == "marker_x" || row.name == "marker_y") {
-      row.tolerance = kMarkerShare * reach_of(robot);
-    }
-    if (row.name == "marker_yaw") row.tolerance = kMarkerYaw_rad;
-  }
+  std::vector<KinematicRow> rows = rows_of(robot, /*changes=*/true);
   if (!is_steered(robot)) return rows;
   const double held_m_s2 = robot.friction * robot.friction_ratio * kGravity_m_s2;
   rows.push_back({"grip", std::log(held_m_s2), kGripShare, "log", "-"});
