@@ -5,7 +5,6 @@
 #include <ctime>
 #include <numeric>
 #include <utility>
-#include <vector>
 
 namespace gapfarm {
 namespace {
@@ -30,6 +29,41 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 }  // namespace
+
+std::vector<std::string_view> parts_of(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t end = 0; end != text.npos; text.remove_prefix(std::min(end + 1, text.size()))) {
+    end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+  }
+  return parts;
+}
+
+std::vector<std::string_view> lines_of(std::string_view text) {
+  std::vector<std::string_view> lines = parts_of(text, '\n');
+  if (lines.back().empty()) lines.pop_back();
+  for (std::string_view& line : lines) {
+    if (line.ends_with('\r')) line.remove_suffix(1);
+  }
+  return lines;
+}
+
+std::vector<std::string_view> tokens_of(std::string_view text) {
+  constexpr const char* kBlanks = " \t\r\n";
+  std::vector<std::string_view> tokens;
+  for (std::size_t at = text.find_first_not_of(kBlanks); at != text.npos;) {
+    const std::size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
+    tokens.push_back(text.substr(at, end - at));
+    at = text.find_first_not_of(kBlanks, end);
+  }
+  return tokens;
+}
+
+std::pair<std::string, std::optional<std::string>> cut_at(std::string_view text, char mark) {
+  const std::size_t at = text.find(mark);
+  if (at == text.npos) return {std::string(text), {}};
+  return {std::string(text.substr(0, at)), std::string(text.substr(at + 1))};
+}
 
 std::string shell_quoted(const std::string& word) {
   const auto plain = [](char c) {

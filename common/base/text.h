@@ -9,6 +9,8 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace gapfarm {
 
@@ -51,6 +53,15 @@ inline std::string_view trimmed(std::string_view text) {
   if (begin == text.npos) return {};
   return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
+
+// What lies between separators: one part more than there are of these.
+std::vector<std::string_view> parts_of(std::string_view text, char separator);
+// Without their ends, "\n" or "\r\n".
+std::vector<std::string_view> lines_of(std::string_view text);
+// Between blanks, tabs and line ends.
+std::vector<std::string_view> tokens_of(std::string_view text);
+// "KEY=VALUE" at its first mark; no second part where there is none.
+std::pair<std::string, std::optional<std::string>> cut_at(std::string_view text, char mark);
 
 // A word of a shell command, for whoever pastes one: quoted only where a shell would take it for
 // more than one word.

@@ -201,10 +201,7 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
   return robot;
 }
 
-Result<GroundRobot> read_robot(const std::string& path) {
-  ASSIGN_OR_RETURN(auto text, read_text_file(path));
-  return parse_robot(text, path);
-}
+Result<GroundRobot> read_robot(const std::string& path) { return parse_file(path, parse_robot); }
 
 std::string format_robot(const GroundRobot& robot) {
   TomlLines out;

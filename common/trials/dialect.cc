@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "common/base/text.h"
+
 namespace gapfarm {
 namespace {
 
@@ -144,26 +146,12 @@ Status check_decimals(const std::vector<CsvRow>& rows, std::size_t first, char s
                     "write all decimals alike, and no separators of thousands");
 }
 
-std::vector<std::string_view> words_of(std::string_view line) {
-  std::vector<std::string_view> tokens;
-  for (std::size_t at = line.find_first_not_of(" \t"); at != line.npos;) {
-    const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
-    tokens.push_back(line.substr(at, end - at));
-    at = line.find_first_not_of(" \t", end);
-  }
-  return tokens;
-}
-
 std::string blanks_to_commas(std::string_view text) {
   std::string out;
   bool numbers = false;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    std::string_view line = text.substr(at, end - at);
-    at = end + 1;
+  for (const std::string_view line : lines_of(text)) {
     if (line.find_first_of(",;\"\t") != line.npos) return "";
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    std::vector<std::string_view> tokens = words_of(line);
+    std::vector<std::string_view> tokens = tokens_of(line);
     if (!tokens.empty() && (tokens[0][0] == '#' || tokens[0][0] == '%')) {
       tokens[0].remove_prefix(1);
       if (tokens[0].empty()) tokens.erase(tokens.begin());

@@ -39,9 +39,6 @@ TableHead read_head(const std::vector<CsvRow>& rows, char separator);
 Status check_decimals(const std::vector<CsvRow>& rows, std::size_t first, char separator,
                       const std::string& file);
 
-// Between blanks and tabs.
-std::vector<std::string_view> words_of(std::string_view line);
-
 // Columns between blanks alone, as Octave and NumPy write them, by commas: a '#' or '%' before a
 // header of names is no name, and other lines of comments are blank.  Empty: they are not such.
 std::string blanks_to_commas(std::string_view text);

@@ -35,7 +35,7 @@ Result<std::string> read_text_file(const std::string& path) {
   if (std::filesystem::is_directory(status)) {
     const std::filesystem::path model = std::filesystem::path(path) / "model.toml";
     return Error{path + ": is a folder, expected a file; name " +
-                 (std::filesystem::exists(model, code) ? model.string() : "the files in it")};
+                 (is_there(model) ? model.string() : "the files in it")};
   }
   std::ifstream in(path, std::ios::binary);
   std::ostringstream bytes;
@@ -70,8 +70,7 @@ Status put_in_place(const std::string& temporary, const std::string& path, IfThe
       return {};
     }
     // Not so on a file system without second names, where a rename has to do.
-    std::error_code code;
-    if (errno == EEXIST || std::filesystem::exists(path, code)) {
+    if (errno == EEXIST || is_there(path)) {
       return Error{path +
                    ": has appeared meanwhile and stays; what was to be written there is in " +
                    temporary};
@@ -85,11 +84,21 @@ Status put_in_place(const std::string& temporary, const std::string& path, IfThe
 
 }  // namespace
 
+bool is_there(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
+bool is_folder(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored);
+}
+
 std::string path_from(const std::string& folder, const std::string& path) {
   std::error_code ignored;
   const std::filesystem::path there = (std::filesystem::path(folder) / path).lexically_normal();
   const bool here = std::filesystem::absolute(path, ignored).lexically_normal() == there;
-  return !here && std::filesystem::exists(there, ignored) ? there.string() : path;
+  return !here && is_there(there) ? there.string() : path;
 }
 
 Status write_file_atomically(const std::string& given, std::string_view bytes, IfThere if_there) {

@@ -1,6 +1,7 @@
 // Whole text files in and out.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -10,6 +11,18 @@ namespace gapfarm {
 
 // The bytes of a file.  Errors name the path and say whether it is missing, a folder or unreadable.
 Result<std::string> read_text_file(const std::string& path);
+
+// What `parse` makes of the text of a file and its path; the errors of either.
+template <class Parse>
+auto parse_file(const std::string& path, const Parse& parse) -> decltype(parse(path, path)) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return text.error();
+  return parse(*text, path);
+}
+
+// Whether there is such a file or folder, or such a folder; of what cannot be looked at: no.
+bool is_there(const std::filesystem::path& path);
+bool is_folder(const std::filesystem::path& path);
 
 // `path` as a command that was called in `folder` meant it: below that where it is relative and
 // there is such a file, as it stands otherwise, or where that is the same.

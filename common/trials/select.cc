@@ -7,21 +7,10 @@
 namespace gapfarm {
 namespace {
 
-bool same(const std::string& a, const std::string& b) {
+bool same(std::string_view a, std::string_view b) {
   const auto x = parse_double(a);
   const auto y = parse_double(b);
   return x && y ? *x == *y : a == b;
-}
-
-std::vector<std::string> values_of(const std::string& list) {
-  std::vector<std::string> values;
-  std::size_t begin = 0;
-  while (begin <= list.size()) {
-    const std::size_t end = std::min(list.find(',', begin), list.size());
-    values.push_back(list.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return values;
 }
 
 }  // namespace
@@ -49,17 +38,15 @@ Result<TrialColumnReader> trial_column_reader(const TrialLog& log, const std::st
 Result<TrialLog> select_trials(const TrialLog& log, std::span<const std::string> filters) {
   TrialLog chosen = log;
   for (const std::string& filter : filters) {
-    const std::size_t equals = filter.find('=');
-    if (equals == std::string::npos || equals == 0) {
-      return Error{filter + ": expected COLUMN=VALUE[,VALUE...]"};
-    }
-    const auto reader = trial_column_reader(log, filter.substr(0, equals));
+    const auto [column, list] = cut_at(filter, '=');
+    if (column.empty() || !list) return Error{filter + ": expected COLUMN=VALUE[,VALUE...]"};
+    const auto reader = trial_column_reader(log, column);
     if (!reader) return Error{filter + ": " + reader.error().message};
-    const std::vector<std::string> values = values_of(filter.substr(equals + 1));
+    const auto values = parts_of(*list, ',');
     std::erase_if(chosen.trials, [&](const Trial& trial) {
       const std::string word = (*reader)(trial);
       return std::none_of(values.begin(), values.end(),
-                          [&](const std::string& value) { return same(word, value); });
+                          [&](std::string_view value) { return same(word, value); });
     });
     if (chosen.trials.empty()) return Error{filter + ": no trials are left"};
   }

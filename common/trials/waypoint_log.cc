@@ -2,7 +2,6 @@
 #include <optional>
 
 #include "common/base/text.h"
-#include "common/trials/dialect.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "common/trials/text/csv.h"
@@ -93,13 +92,11 @@ class Reader {
 Result<WaypointLog> parse_waypoint_log(std::string_view text, const std::string& file) {
   Reader reader;
   std::size_t line_number = 0;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
+  for (const std::string_view line : lines_of(text)) {
     ++line_number;
-    if (const auto expected = reader.take(words_of(trimmed(text.substr(0, end))))) {
+    if (const auto expected = reader.take(tokens_of(line))) {
       return text_error(file, {line_number, 1}, "a broken line", *expected);
     }
-    text.remove_prefix(std::min(end + 1, text.size()));
   }
   if (reader.log.targets.empty() || reader.log.path.empty()) {
     return Error{file +
@@ -110,8 +107,7 @@ Result<WaypointLog> parse_waypoint_log(std::string_view text, const std::string&
 }
 
 Result<WaypointLog> read_waypoint_log(const std::string& file) {
-  ASSIGN_OR_RETURN(const auto text, read_text_file(file));
-  return parse_waypoint_log(text, file);
+  return parse_file(file, parse_waypoint_log);
 }
 
 }  // namespace gapfarm

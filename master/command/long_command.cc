@@ -30,18 +30,9 @@ constexpr double kRecordInterval_s = 1;  // each costs a disk write
 // Words of this process's command line, without the program.
 std::vector<std::string> own_arguments() {
   const Result<std::string> bytes = read_text_file("/proc/self/cmdline");
-  std::vector<std::string> program_arguments;
-  if (!bytes) return program_arguments;
-  std::string word;
-  for (const char c : *bytes) {
-    if (c != '\0') {
-      word += c;
-      continue;
-    }
-    program_arguments.push_back(std::exchange(word, {}));
-  }
-  if (!program_arguments.empty()) program_arguments.erase(program_arguments.begin());
-  return program_arguments;
+  if (!bytes || bytes->empty()) return {};
+  const auto parts = parts_of(*bytes, '\0');  // each of them ends in one
+  return {parts.begin() + 1, parts.end() - 1};
 }
 
 // Empty where nothing says whose state it would be.

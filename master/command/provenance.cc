@@ -51,10 +51,9 @@ std::string format_stamp(const Provenance& stamp) {
 
 Result<FolderState> compare_stamp(const std::string& folder, const std::string& result,
                                   const Provenance& stamp, bool force) {
-  std::error_code code;
   const std::string file = (fs::path(folder) / kStampFile).string();
-  const bool finished = fs::exists(fs::path(folder) / result, code);
-  if (!fs::exists(file, code)) {
+  const bool finished = is_there(fs::path(folder) / result);
+  if (!is_there(file)) {
     if (!finished) return FolderState::kNew;
     return Error{folder + ": holds results that do not say of what; choose another --out"};
   }

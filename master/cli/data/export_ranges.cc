@@ -26,8 +26,7 @@ Result<Ranges> ranges_of_trials(const std::string& path) {
 Result<Ranges> read_ranges(const std::string& source, Console& console) {
   ASSIGN_OR_RETURN(const auto values, values_in(source));
   const auto diagnosis = std::filesystem::path(source) / "diagnosis.json";
-  std::error_code ignored;
-  if (!values && std::filesystem::exists(diagnosis, ignored)) {
+  if (!values && is_there(diagnosis)) {
     return ranges_of_trials(diagnosis.string());
   }
   GroundSource ground;

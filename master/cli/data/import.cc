@@ -44,8 +44,7 @@ Result<std::vector<Recording>> read_all(const std::vector<std::string>& files, b
 
 Result<LogMap> read_map(const std::string& path, const std::vector<Recording>& recordings) {
   if (path.empty()) return guess_map(recordings);
-  ASSIGN_OR_RETURN(const std::string text, read_text_file(path));
-  return parse_map(text, path);
+  return parse_file(path, parse_map);
 }
 
 // What there is, for somebody who has to write a map.

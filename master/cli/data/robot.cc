@@ -19,13 +19,7 @@ struct RobotOptions {
 
 // Names come from files: they may not steer the terminal.
 std::string plain_lines(const std::string& text) {
-  std::string out;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    out += printable(std::string_view(text).substr(at, end - at)) + "\n";
-    at = end + 1;
-  }
-  return out;
+  return joined(lines_of(text), "", [](std::string_view line) { return printable(line) + "\n"; });
 }
 
 std::string next_steps_of(const RobotSetup& setup) {

@@ -32,16 +32,14 @@ Result<RobotReading> read_toml(const std::string& file) {
 }
 
 Result<RobotReading> read_urdf(const std::string& file, const std::vector<DriveFacts>& facts) {
-  ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
-  ASSIGN_OR_RETURN(const UrdfModel model, parse_urdf(text, file));
+  ASSIGN_OR_RETURN(const UrdfModel model, parse_file(file, parse_urdf));
   return understand_robot(model, facts);
 }
 
 Result<std::vector<DriveFacts>> read_controllers(const std::vector<std::string>& files) {
   std::vector<DriveFacts> facts;
   for (const std::string& file : files) {
-    ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
-    ASSIGN_OR_RETURN(const ControllerFile read, parse_controllers(text, file));
+    ASSIGN_OR_RETURN(const ControllerFile read, parse_file(file, parse_controllers));
     facts.insert(facts.end(), read.drives.begin(), read.drives.end());
   }
   return facts;
@@ -82,9 +80,8 @@ Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
 
 RobotSetup setup_of_arguments(const std::vector<std::string>& arguments, const std::string& out) {
   RobotSetup setup;
-  std::error_code ignored;
   for (const std::string& word : arguments) {
-    (fs::is_directory(word, ignored) ? setup.runs : setup.files).push_back(word);
+    (is_folder(word) ? setup.runs : setup.files).push_back(word);
   }
   setup.robot = robot_beside(out);
   setup.config = out;

@@ -62,12 +62,9 @@ Result<Page> page_of_run(const std::filesystem::path& run) {
 }
 
 Result<Page> page_of(const std::filesystem::path& from) {
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(from, ignored)) return page_of_diagnosis(from);
-  if (std::filesystem::exists(from / "diagnosis.json", ignored)) {
-    return page_of_diagnosis(from / "diagnosis.json");
-  }
-  if (std::filesystem::exists(from / "run.sqlite", ignored)) return page_of_run(from);
+  if (!is_folder(from)) return page_of_diagnosis(from);
+  if (is_there(from / "diagnosis.json")) return page_of_diagnosis(from / "diagnosis.json");
+  if (is_there(from / "run.sqlite")) return page_of_run(from);
   return Error{from.string() +
                ": holds neither a diagnosis.json nor a run.sqlite; give a folder that diagnose or "
                "evolve wrote"};

@@ -13,6 +13,7 @@
 #include "common/base/text.h"
 #include "common/problem/problem.h"
 #include "common/robot/robot.h"
+#include "common/trials/files.h"
 #include "master/cli/diagnosis/diagnose_command.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
@@ -53,8 +54,7 @@ struct RobotFolder {
 };
 
 bool is_run(const fs::path& folder) {
-  std::error_code ignored;
-  return fs::exists(folder / "commands.csv", ignored) || fs::exists(folder / "poses.csv", ignored);
+  return is_there(folder / "commands.csv") || is_there(folder / "poses.csv");
 }
 
 double begin_of(const RunFolder& run) { return run.log.runs.front().poses.front().t_s; }
@@ -93,12 +93,11 @@ std::vector<RobotFolder> find_robots(const fs::path& folder) {
 
 // Of each robot its own file, else one for all.
 Status read_robots(const WatchCommand& command, std::vector<RobotFolder>* robots) {
-  std::error_code ignored;
   for (RobotFolder& robot : *robots) {
     fs::path file = command.robot;
     if (file.empty()) file = robot.path / kRobotFile;
-    if (!fs::exists(file, ignored)) file = fs::path(command.folder) / kRobotFile;
-    if (command.robot.empty() && !fs::exists(file, ignored)) {
+    if (!is_there(file)) file = fs::path(command.folder) / kRobotFile;
+    if (command.robot.empty() && !is_there(file)) {
       const bool one = robot.path == fs::path(command.folder);
       return Error{"found no robot file for " + robot.name + ": put robot.toml into " +
                    command.folder + (one ? "" : " (one for all) or " + robot.path.string()) +
@@ -226,8 +225,8 @@ Result<int> run_watch(WatchCommand& command, CliContext& context) {
   for (const char* name : {"watch.json", "report.html"}) {
     const std::string path = (out / name).string();
     // What it made itself it makes again.
-    RETURN_IF_ERROR(fs::exists(out / kFittedRuns, ignored) ? command.outputs.plan_again(path)
-                                                           : command.outputs.plan(path));
+    RETURN_IF_ERROR(is_there(out / kFittedRuns) ? command.outputs.plan_again(path)
+                                                : command.outputs.plan(path));
   }
   std::vector<RobotFolder> robots = find_robots(command.folder);
   if (robots.empty()) {

@@ -2,13 +2,13 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
 #include "common/base/text.h"
 #include "common/json/fields.h"
+#include "common/trials/files.h"
 #include "master/command/long_command.h"
 #include "master/run/run.h"
 
@@ -164,8 +164,7 @@ Status EvolutionOptions::complete() {
 Result<int> begin_run(const std::string& out, const Config& config, const EvolutionOptions& options,
                       const EvolutionOverrides& overrides, Log& log, CliContext& context) {
   if (context.stop.requested()) return kExitSignalBase + context.stop.signal();
-  std::error_code ignored;
-  const bool folder_was_there = std::filesystem::exists(out, ignored);
+  const bool folder_was_there = is_there(out);
   ASSIGN_OR_RETURN(RunStore store, RunStore::create(out, run_info(config, overrides)));
   const int code = run_evolution(store, config, options, log, context);
   const auto checkpoint = store.checkpoint();

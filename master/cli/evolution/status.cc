@@ -14,6 +14,7 @@
 
 #include "common/base/text.h"
 #include "common/json/json.h"
+#include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 #include "master/command/console.h"
 #include "master/command/long_command.h"
@@ -280,16 +281,13 @@ struct Look {
 // The folder where the command keeps what it simulates: `path` itself, or, where that is a file or
 // is to be one, the folder beside it.
 std::filesystem::path command_folder(const std::string& path) {
-  std::error_code ignored;
   const std::filesystem::path partial = path + ".partial";
-  return std::filesystem::exists(answer_file(partial), ignored) ? partial
-                                                                : std::filesystem::path(path);
+  return is_there(answer_file(partial)) ? partial : std::filesystem::path(path);
 }
 
 Result<Look> look(const std::string& run, const Console& console) {
   const double now_s = unix_now_s();
-  std::error_code ignored;
-  if (!std::filesystem::exists(run_store_file(run), ignored) || command_folder(run) != run) {
+  if (!is_there(run_store_file(run)) || command_folder(run) != run) {
     ASSIGN_OR_RETURN(const auto record, command_status(command_folder(run), now_s));
     if (record) {
       return Look{to_json(*record), command_screen(*record, run, now_s, console),

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
+#include "common/base/text.h"
 #include "common/config/config.h"
 #include "common/trials/trial.h"
 #include "master/cli/models/parameter_options.h"
@@ -29,16 +29,12 @@ struct CrossfitOptions {
   KeepOption keep;
 };
 
-std::vector<std::string> tokens_of(const std::string& text) {
-  std::istringstream in(text);
-  std::vector<std::string> tokens;
-  for (std::string word; in >> word;) tokens.push_back(word);
-  return tokens;
-}
-
 CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
   CrossfitPlan plan = options.plan;
-  for (const std::string& test : options.tests) plan.tests.push_back(tokens_of(test));
+  for (const std::string& test : options.tests) {
+    const auto filters = tokens_of(test);
+    plan.tests.emplace_back(filters.begin(), filters.end());
+  }
   plan.tuning = {config.evolution, options.seed.value_or(config.seed)};
   if (options.evaluations) plan.tuning.evolution.evaluations = *options.evaluations;
   return plan;

@@ -3,7 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -13,6 +13,7 @@
 #include "common/base/text.h"
 #include "common/problem/abilities.h"
 #include "common/trials/read.h"
+#include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
@@ -46,17 +47,11 @@ struct Task {
 Result<std::vector<double>> numbers(const std::string& text, std::size_t count,
                                     const std::string& what) {
   std::vector<double> found;
-  const char* at = text.data();
-  const char* const end = text.data() + text.size();
-  while (at < end && found.size() < count) {
-    double value = 0;
-    const auto [rest, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || !std::isfinite(value)) break;
-    found.push_back(value);
-    at = rest;
-    if (at < end && *at == ',') ++at;
+  for (const std::string_view part : parts_of(text, ',')) {
+    found.push_back(parse_double(part).value_or(NAN));
   }
-  if (found.size() != count || at != end) {
+  if (found.size() != count ||
+      !std::ranges::all_of(found, [](double v) { return std::isfinite(v); })) {
     return Error{what + " is '" + text + "', expected " + std::to_string(count) +
                  " numbers with commas between"};
   }
@@ -65,14 +60,12 @@ Result<std::vector<double>> numbers(const std::string& text, std::size_t count,
 
 // "forward" or "turn_ccw:0.5".
 Result<CommandSpec> command_of(const std::string& text, const std::vector<CommandSpec>& known) {
-  const std::size_t colon = text.find(':');
-  const std::string name = text.substr(0, colon);
+  const auto [name, duration] = cut_at(text, ':');
   for (const CommandSpec& spec : known) {
     if (spec.name != name) continue;
     CommandSpec command = spec;
-    if (colon != std::string::npos) {
-      ASSIGN_OR_RETURN(const auto seconds,
-                       numbers(text.substr(colon + 1), 1, "the duration of " + name));
+    if (duration) {
+      ASSIGN_OR_RETURN(const auto seconds, numbers(*duration, 1, "the duration of " + name));
       if (!(seconds[0] > 0 && seconds[0] <= kLongestCommand_s)) {
         return Error{
             fmt::format("command '{}' lasts outside (0, {:g}] s", text, kLongestCommand_s)};

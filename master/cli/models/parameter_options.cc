@@ -1,6 +1,5 @@
 #include "master/cli/models/parameter_options.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 
 #include "common/base/ranges.h"
@@ -19,20 +18,18 @@ std::optional<double> value_of_text(const Parameter& row, const std::string& tex
 
 Status apply_setting(const std::string& setting, Problem& problem, const std::string& option) {
   const ParameterTable& table = problem.table();
-  const std::size_t equals = setting.find('=');
-  const std::string key = setting.substr(0, equals);
+  const auto [key, text] = cut_at(setting, '=');
   const std::vector<std::string> known = mapped(table.rows(), &Parameter::key);
   const auto row = table.find(key);
-  if (!row || equals == std::string::npos) {
+  if (!row || !text) {
     return Error{option + " " + setting + ": expected PARAMETER=VALUE" +
                  (row ? "" : ", and there is no parameter '" + key + "'" + suggestion(key, known))};
   }
-  const std::string text = setting.substr(equals + 1);
-  const auto value = value_of_text(table[*row], text);
+  const auto value = value_of_text(table[*row], *text);
   if (!value) {
     const std::vector<std::string>& choices = table[*row].choices;
-    return Error{option + " " + setting + ": '" + text + "' is not a number" +
-                 (choices.empty() ? "" : suggestion(text, choices))};
+    return Error{option + " " + setting + ": '" + *text + "' is not a number" +
+                 (choices.empty() ? "" : suggestion(*text, choices))};
   }
   if (Status s = table.check(*row, *value); !s)
     return Error{option + " " + setting + ": " + s.error().message};
@@ -45,21 +42,20 @@ Status apply_genes(const std::vector<std::string>& genes, Problem& problem,
   const ParameterTable& table = problem.table();
   problem.genes.clear();
   for (const std::string& text : genes) {
-    const std::size_t equals = text.find('=');
-    const std::string key = text.substr(0, equals);
+    const auto [key, range] = cut_at(text, '=');
     const auto row = table.find(key);
     if (!row) {
       return Error{option + " " + text + ": there is no parameter '" + key + "'" +
                    suggestion(key, mapped(table.rows(), &Parameter::key))};
     }
     Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
-    if (equals != std::string::npos) {
-      const std::size_t comma = text.find(',', equals);
-      const bool read =
-          comma != std::string::npos &&
-          CLI::detail::lexical_cast(text.substr(equals + 1, comma - equals - 1), gene.lower) &&
-          CLI::detail::lexical_cast(text.substr(comma + 1), gene.upper);
-      if (!read) return Error{option + " " + text + ": expected KEY or KEY=LOWER,UPPER"};
+    if (range) {
+      const auto ends = mapped(parts_of(*range, ','), parse_double);
+      if (ends.size() != 2 || !ends[0] || !ends[1]) {
+        return Error{option + " " + text + ": expected KEY or KEY=LOWER,UPPER"};
+      }
+      gene.lower = *ends[0];
+      gene.upper = *ends[1];
     }
     for (const double end : {gene.lower, gene.upper}) {
       if (Status s = table.check(*row, end); !s) {

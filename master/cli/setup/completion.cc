@@ -8,6 +8,7 @@
 #include <set>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/config/config.h"
 #include "master/cli/completion_scripts.h"
 #include "master/cli/subcommand.h"
@@ -186,14 +187,9 @@ void add_problem_arguments(const Place& place, Takes takes, const std::string& b
 std::vector<std::string> choices_of(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   const std::size_t open = type.find('{'), close = type.find('}');
-  std::vector<std::string> arguments;
-  if (open == type.npos || close == type.npos || close < open) return arguments;
-  for (std::size_t at = open + 1; at < close;) {
-    const std::size_t end = std::min(close, type.find(',', at));
-    arguments.push_back(type.substr(at, end - at));
-    at = end + 1;
-  }
-  return arguments;
+  if (open == type.npos || close == type.npos || close < open) return {};
+  const auto choices = parts_of(std::string_view(type).substr(open + 1, close - open - 1), ',');
+  return {choices.begin(), choices.end()};
 }
 
 void add_values(const Place& place, const CLI::Option& option, const std::string& begun,

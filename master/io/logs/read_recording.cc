@@ -108,11 +108,11 @@ std::string format_commands(const std::vector<std::string>& channels, const RunL
 class FileSource : public ByteSource {
  public:
   static Result<FileSource> open(const std::string& path) {
-    std::error_code code;
-    if (std::filesystem::is_directory(path, code)) {
+    if (is_folder(path)) {
       return Error{path + ": a folder; give the file in it (.db3, .mcap, .bag or .csv)"};
     }
     FileSource source;
+    std::error_code code;
     source.file_.open(path, std::ios::binary);
     source.size_ = std::filesystem::file_size(path, code);
     if (!source.file_ || code) {

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/trials/dialect.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
@@ -42,25 +43,17 @@ double number_of(const std::string& text, char separator = ',') {
 
 bool is_number(const std::string& text) { return parse_double(text).has_value(); }
 
-std::string_view first_line(std::string_view text) {
-  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
-  return text.substr(0, text.find_first_of("\r\n"));
-}
-
 // `t x y z qx qy qz qw`, blanks between, comments with '#'.
 Result<Recording> parse_tum(std::string_view text, const std::string& file, Mistakes& mistakes) {
   LogTable table{file, "", "tum", {"t", "x", "y", "z", "qx", "qy", "qz", "qw"}, {}};
   std::size_t line_number = 0;
-  for (std::size_t at = 0; at < text.size(); ++line_number) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    std::string_view line = text.substr(at, end - at);
-    at = end + 1;
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    const std::vector<std::string_view> tokens = words_of(line);
+  for (const std::string_view line : lines_of(text)) {
+    ++line_number;
+    const std::vector<std::string_view> tokens = tokens_of(line);
     if (tokens.empty() || tokens[0][0] == '#') continue;
     if (tokens.size() != 8) {
       mistakes.add_row(
-          {text_error(file, {line_number + 1, 1}, std::to_string(tokens.size()) + " numbers",
+          {text_error(file, {line_number, 1}, std::to_string(tokens.size()) + " numbers",
                       "8 (t x y z qx qy qz qw)", "check the line")});
       table.values.insert(table.values.end(), 8, kBlank);
       continue;
@@ -70,7 +63,7 @@ Result<Recording> parse_tum(std::string_view text, const std::string& file, Mist
     for (const std::string_view word : tokens) {
       pose.push_back(parse_double(word).value_or(kBlank));
       if (std::isfinite(pose.back())) continue;
-      errors.push_back(text_error(file, {line_number + 1, 1}, quoted_word(word), "a number",
+      errors.push_back(text_error(file, {line_number, 1}, quoted_word(word), "a number",
                                   "remove poses that were not measured"));
     }
     mistakes.add_row(errors);
@@ -329,17 +322,14 @@ Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file
 }
 
 bool looks_like_tum(std::string_view text) {
-  while (!text.empty() && (text[0] == '#' || text[0] == '\n' || text[0] == '\r')) {
-    const std::size_t end = text.find('\n');
-    if (end == text.npos) return false;
-    text.remove_prefix(end + 1);
+  for (const std::string_view line : lines_of(text)) {
+    if (line.empty() || line[0] == '#') continue;
+    const auto tokens = tokens_of(line);
+    return tokens.size() == 8 && std::ranges::all_of(tokens, [](std::string_view word) {
+             return parse_double(word).has_value();
+           });
   }
-  const std::string_view line = first_line(text);
-  if (line.find(',') != line.npos) return false;
-  const auto tokens = words_of(line);
-  return tokens.size() == 8 && std::ranges::all_of(tokens, [](std::string_view word) {
-           return parse_double(word).has_value();
-         });
+  return false;
 }
 
 Result<Recording> parse_form(std::string_view text, const std::string& file, Mistakes& mistakes) {

@@ -40,4 +40,16 @@ TEST(Result, CarriesAValueOrAnError) {
   EXPECT_EQ(bad.error().message, "no");
 }
 
+TEST(Text, IsCutAtMarksLinesAndBlanks) {
+  using Views = std::vector<std::string_view>;
+  EXPECT_EQ(parts_of("a,,b,", ','), (Views{"a", "", "b", ""}));
+  EXPECT_EQ(parts_of("", ','), Views{""});
+  EXPECT_EQ(lines_of("a\r\n\nb"), (Views{"a", "", "b"}));
+  EXPECT_EQ(lines_of("a\n"), Views{"a"});
+  EXPECT_EQ(lines_of(""), Views{});
+  EXPECT_EQ(tokens_of(" a\tb  c\r\n"), (Views{"a", "b", "c"}));
+  EXPECT_EQ(cut_at("a=b=c", '='), std::pair(std::string("a"), std::optional<std::string>("b=c")));
+  EXPECT_FALSE(cut_at("a", '=').second);
+}
+
 }  // namespace gapfarm::base_test

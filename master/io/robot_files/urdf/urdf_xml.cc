@@ -1,7 +1,8 @@
 #include <cmath>
 #include <set>
-#include <sstream>
 
+#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/urdf/urdf.h"
 #include "master/io/robot_files/urdf/xml_reader.h"
@@ -203,10 +204,10 @@ class Reader : private XmlReader {
         any = true;
       }
       if (name == "fdir1") {
-        std::istringstream text(value_of(*child));
-        Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-        std::string word;
-        for (double& v : direction) v = text >> word ? parse_double(word).value_or(NAN) : NAN;
+        const std::string text = value_of(*child);
+        const auto v = mapped(tokens_of(text), parse_double);
+        if (v.size() < 3 || !v[0] || !v[1] || !v[2]) continue;
+        const Eigen::Vector3d direction(*v[0], *v[1], *v[2]);
         if (direction.allFinite() && !direction.isZero()) surface.fdir1 = direction;
       }
     }

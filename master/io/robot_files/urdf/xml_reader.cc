@@ -117,16 +117,14 @@ std::optional<std::vector<double>> XmlReader::numbers(const Element& element, co
     return {};
   }
   std::vector<double> all;
-  for (std::size_t at = text.find_first_not_of(kBlanks); at != text.npos;) {
-    const std::size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
-    const auto value = parse_double(std::string_view(text).substr(at, end - at));
+  for (const std::string_view word : tokens_of(text)) {
+    const auto value = parse_double(word);
     if (!value || !(std::abs(*value) <= kGreatestNumber)) {
-      fail(element, "found " + quoted_word(text.substr(at, end - at)) + " in '" + name +
+      fail(element, "found " + quoted_word(word) + " in '" + name +
                         "', expected a number; write decimals with a point");
       return {};
     }
     all.push_back(*value);
-    at = text.find_first_not_of(kBlanks, end);
   }
   if (all.size() == count) return all;
   fail(element, "found " + std::to_string(all.size()) + " numbers in '" + name + "', expected " +
