@@ -1,5 +1,4 @@
 #include <boost/crc.hpp>
-#include <cstring>
 #include <map>
 
 #include "common/trials/text/csv.h"
@@ -10,70 +9,34 @@ namespace gapfarm {
 namespace {
 
 constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
-constexpr std::uint64_t kMostRecord = 1ull << 30;
 constexpr const char* kRecover = "copy the file again, or mend it by mcap recover";
 
 enum Op : unsigned char { kFooter = 2, kSchema = 3, kChannel = 4, kMessage = 5, kChunk = 6 };
-
-// Takes values off the front; after one that is not there nothing is good.
-class Cursor {
- public:
-  explicit Cursor(std::string_view bytes) : bytes_(bytes) {}
-
-  template <class T>
-  T number() {
-    T value{};
-    const std::string_view raw = take(sizeof value);
-    if (good_) std::memcpy(&value, raw.data(), sizeof value);
-    return value;
-  }
-  std::string_view text() { return take(number<std::uint32_t>()); }
-  std::string_view take(std::uint64_t count) {
-    if (!good_ || count > bytes_.size()) {
-      good_ = false;
-      return {};
-    }
-    const std::string_view front = bytes_.substr(0, count);
-    bytes_.remove_prefix(count);
-    return front;
-  }
-  std::string_view rest() const { return bytes_; }
-  bool good() const { return good_; }
-
- private:
-  std::string_view bytes_;
-  bool good_ = true;
-};
 
 struct Schema {
   std::string name, encoding, text;
 };
 
-class McapReader {
+class McapReader : BagRecords {
  public:
   McapReader(ByteSource& source, const std::string& file)
-      : source_(source), file_(file), topics_(file, "an MCAP file") {}
+      : BagRecords(source, file, "an MCAP file", kRecover) {}
 
   Result<Recording> run() {
-    std::string bytes;
-    if (!source_.read(0, kMagic.size(), bytes) || bytes != kMagic) {
+    std::string magic;
+    if (!source_.read(0, kMagic.size(), magic) || magic != kMagic) {
       return error(0, "other bytes than MCAP's first eight", "an MCAP file", "check its name");
     }
     std::uint64_t at = kMagic.size();
     while (!ended_) {
-      if (!source_.read(at, 9, bytes)) return cut(at);
-      const auto op = static_cast<unsigned char>(bytes[0]);
-      std::uint64_t length = 0;
-      std::memcpy(&length, bytes.data() + 1, 8);
+      ASSIGN_OR_RETURN(const auto head, bytes(at, at, 9));
+      ByteCursor cursor(head);
+      const auto op = cursor.number<unsigned char>();
+      const auto length = cursor.number<std::uint64_t>();
       if (length > source_.size() - at) return cut(at);
-      const bool read = op == kSchema || op == kChannel || op == kMessage || op == kChunk;
-      if (read) {
-        if (length > kMostRecord) {
-          return error(at, "a record of " + std::to_string(length) + " bytes", "at most 1 GiB",
-                       kRecover);
-        }
-        if (!source_.read(at + 9, length, bytes)) return cut(at);
-        RETURN_IF_ERROR(record(at, op, bytes));
+      if (op == kSchema || op == kChannel || op == kMessage || op == kChunk) {
+        ASSIGN_OR_RETURN(const auto content, bytes(at, at + 9, length));
+        RETURN_IF_ERROR(record(at, op, content));
       }
       ended_ = op == kFooter;
       at += 9 + length;
@@ -82,35 +45,19 @@ class McapReader {
   }
 
  private:
-  Error error(std::uint64_t at, const std::string& found, const std::string& expected,
-              const std::string& remedy) const {
-    return Error{file_ + ":" + std::to_string(at + 1) + ": found " + found + ", expected " +
-                 expected + "; " + remedy + " (places are bytes)"};
-  }
-  Error cut(std::uint64_t at) const {
-    return error(at, "the end of the file within a record", "whole records and a footer", kRecover);
-  }
   Error broken(std::uint64_t at) const {
-    return error(at, "a record that is shorter than its contents", "whole records", kRecover);
+    return error(at, "a record that is shorter than its contents", "whole records");
   }
 
   Status record(std::uint64_t at, unsigned char op, std::string_view bytes) {
-    Cursor cursor(bytes);
-    switch (op) {
-      case kSchema:
-        return schema(at, cursor);
-      case kChannel:
-        return channel(at, cursor);
-      case kMessage:
-        return message(at, cursor);
-      case kChunk:
-        return chunk(at, cursor);
-      default:
-        return {};
-    }
+    ByteCursor cursor(bytes);
+    if (op == kSchema) return schema(at, cursor);
+    if (op == kChannel) return channel(at, cursor);
+    if (op == kMessage) return message(at, cursor);
+    return op == kChunk ? chunk(at, cursor) : Status();
   }
 
-  Status chunk(std::uint64_t at, Cursor& cursor) {
+  Status chunk(std::uint64_t at, ByteCursor& cursor) {
     if (nested_) return broken(at);
     cursor.take(16);  // first and last time
     const auto size = cursor.number<std::uint64_t>();
@@ -118,19 +65,14 @@ class McapReader {
     const std::string how(cursor.text());
     const std::string_view packed = cursor.take(cursor.number<std::uint64_t>());
     if (!cursor.good()) return broken(at);
-    const Result<std::string> plain = decompress(packed, how, size);
-    if (!plain) {
-      return Error{file_ + ":" + std::to_string(at + 1) + ": " + plain.error().message + "; " +
-                   kRecover};
-    }
+    ASSIGN_OR_RETURN(const auto plain, unpacked(at, packed, how, size));
     boost::crc_32_type found;
-    found.process_bytes(plain->data(), plain->size());
+    found.process_bytes(plain.data(), plain.size());
     if (checksum != 0 && checksum != found.checksum()) {
-      return error(at, "a chunk whose bytes do not add up to its checksum", "those recorded",
-                   kRecover);
+      return error(at, "a chunk whose bytes do not add up to its checksum", "those recorded");
     }
     nested_ = true;
-    Cursor inner(*plain);
+    ByteCursor inner(plain);
     while (!inner.rest().empty()) {
       const auto op = inner.number<unsigned char>();
       const std::string_view bytes = inner.take(inner.number<std::uint64_t>());
@@ -141,7 +83,7 @@ class McapReader {
     return {};
   }
 
-  Status schema(std::uint64_t at, Cursor& cursor) {
+  Status schema(std::uint64_t at, ByteCursor& cursor) {
     const auto id = cursor.number<std::uint16_t>();
     Schema read;
     read.name = cursor.text();
@@ -152,7 +94,7 @@ class McapReader {
     return {};
   }
 
-  Status channel(std::uint64_t at, Cursor& cursor) {
+  Status channel(std::uint64_t at, ByteCursor& cursor) {
     const auto id = cursor.number<std::uint16_t>();
     const auto schema_id = cursor.number<std::uint16_t>();
     BagTopic read;
@@ -168,11 +110,7 @@ class McapReader {
       const bool text = s.encoding == "ros1msg" || s.encoding == "ros2msg";
       const bool serves = serves_ground_robots(s.name), cdr = encoding == "cdr";
       if ((encoding == "ros1" || cdr) && text && serves && !s.text.empty()) {
-        Result<MessageSchema> parsed = MessageSchema::parse(s.name, s.text);
-        if (!parsed) {
-          return error(at, parsed.error().message, "a whole definition of the message", kRecover);
-        }
-        read.schema = *std::move(parsed);
+        ASSIGN_OR_RETURN(read.schema, BagRecords::schema(at, s.name, s.text));
       } else if (cdr && serves && s.text.empty()) {
         // rosbag2 found no definition; as in a .db3 the type's name is to do.
         if (auto known = MessageSchema::known(s.name)) read.schema = *std::move(known);
@@ -184,7 +122,7 @@ class McapReader {
     return {};
   }
 
-  Status message(std::uint64_t at, Cursor& cursor) {
+  Status message(std::uint64_t at, ByteCursor& cursor) {
     const auto id = cursor.number<std::uint16_t>();
     cursor.take(4);  // sequence
     const auto log_time = cursor.number<std::uint64_t>();
@@ -192,20 +130,14 @@ class McapReader {
     if (!cursor.good()) return broken(at);
     const auto found = channels_.find(id);
     if (found == channels_.end()) {
-      return error(at, "a message of channel " + std::to_string(id), "its channel record before it",
-                   kRecover);
+      return error(at, "a message of channel " + std::to_string(id),
+                   "its channel record before it");
     }
     const double t = static_cast<double>(log_time / 1'000'000'000) +
                      1e-9 * static_cast<double>(log_time % 1'000'000'000);
-    if (Status s = topics_.add(found->second, t, cursor.rest()); !s) {
-      return Error{file_ + ":" + std::to_string(at + 1) + ": " + s.error().message};
-    }
-    return {};
+    return add(at, found->second, t, cursor.rest());
   }
 
-  ByteSource& source_;
-  const std::string& file_;
-  Topics topics_;
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, BagTopic> channels_;
   bool nested_ = false;

@@ -60,23 +60,7 @@ constexpr Text kTexts[] = {
     {"ackermann_msgs/AckermannDriveStamped",
      "std_msgs/Header header\nackermann_msgs/AckermannDrive drive\n"}};
 
-}  // namespace
-
-struct PrimitiveType {
-  const char* name;
-  unsigned size;  // bytes; 0: a string
-  char kind;      // i, u, f, s; t: ROS 1's time and duration
-};
-
-namespace {
-
 static_assert(std::endian::native == std::endian::little, "messages are copied as they are");
-
-constexpr PrimitiveType kPrimitives[] = {
-    {"bool", 1, 'u'},    {"byte", 1, 'u'},   {"char", 1, 'u'},   {"int8", 1, 'i'},
-    {"uint8", 1, 'u'},   {"int16", 2, 'i'},  {"uint16", 2, 'u'}, {"int32", 4, 'i'},
-    {"uint32", 4, 'u'},  {"int64", 8, 'i'},  {"uint64", 8, 'u'}, {"float32", 4, 'f'},
-    {"float64", 8, 'f'}, {"string", 0, 's'}, {"time", 8, 't'},   {"duration", 8, 't'}};
 
 constexpr int kDeepest = 16;
 // Whether it is of x, y and the turn in a covariance of six.
@@ -89,111 +73,7 @@ bool is_planar(std::uint32_t count, std::uint32_t i) {
 constexpr std::size_t kMostElements = 64;
 constexpr std::size_t kMostInMessage = 1'000'000;
 
-int primitive_of(std::string_view name) {
-  for (std::size_t i = 0; i < std::size(kPrimitives); ++i) {
-    if (name == kPrimitives[i].name) return static_cast<int>(i);
-  }
-  return -1;
-}
-
 }  // namespace
-
-std::string short_type(std::string_view type) {
-  std::string out(type);
-  const std::size_t at = out.find("/msg/");
-  if (at != out.npos) out.erase(at, 4);
-  return out;
-}
-
-bool serves_ground_robots(std::string_view type) {
-  static constexpr std::string_view kServed[] = {
-      "Twist",        "TwistStamped", "AckermannDrive",   "AckermannDriveStamped",
-      "Odometry",     "JointState",   "PoseStamped",      "PoseWithCovarianceStamped",
-      "Pose2D",       "TFMessage",    "TransformStamped", "Imu",
-      "BatteryState", "String"};
-  const std::string_view name = type.substr(type.rfind('/') + 1);
-  return std::find(std::begin(kServed), std::end(kServed), name) != std::end(kServed);
-}
-
-Status MessageSchema::check(const std::string& type, int depth) const {
-  const auto found = types_.find(type);
-  if (found == types_.end()) {
-    return Error{"type " + quoted_word(type_) + " needs " + quoted_word(type) +
-                 ", which its definition does not hold"};
-  }
-  if (depth > kDeepest) return Error{"type " + quoted_word(type_) + " holds itself"};
-  for (const Field& field : found->second) {
-    if (field.primitive >= 0) continue;
-    RETURN_IF_ERROR(check(field.type, depth + 1));
-  }
-  return {};
-}
-
-Result<MessageSchema> MessageSchema::parse(const std::string& type, std::string_view definition) {
-  MessageSchema schema;
-  schema.type_ = short_type(type);
-  std::string current = schema.type_;
-  schema.types_[current];
-  // Types within are named with their package, or without it when it is the holder's own.
-  std::vector<std::string> defined;
-  for (std::size_t at = 0; at < definition.size();) {
-    const std::size_t end = std::min(definition.find('\n', at), definition.size());
-    std::string_view line = definition.substr(at, end - at);
-    at = end + 1;
-    if (const std::size_t hash = line.find('#'); hash != line.npos) line = line.substr(0, hash);
-    line = trimmed(line);
-    if (line.empty() || line[0] == '=') continue;
-    if (line.substr(0, 4) == "MSG:") {
-      current = short_type(trimmed(line.substr(4)));
-      schema.types_[current];
-      continue;
-    }
-    const std::size_t blank = line.find_first_of(" \t");
-    if (blank == line.npos) return Error{"found the definition line " + quoted_word(line)};
-    std::string_view word = line.substr(0, blank);
-    std::string_view name = trimmed(line.substr(blank));
-    name = name.substr(0, name.find_first_of(" \t="));
-    // Constants take no room; ROS 2's defaults stand behind a blank.
-    const std::size_t equals = line.find('=');
-    if (equals != line.npos && trimmed(line.substr(blank, equals - blank)) == name) continue;
-    Field field;
-    field.name = name;
-    if (const std::size_t bracket = word.find('['); bracket != word.npos) {
-      field.array = true;
-      const std::string_view inside = word.substr(bracket + 1, word.size() - bracket - 2);
-      if (inside.substr(0, 2) != "<=") {
-        field.fixed = static_cast<std::size_t>(
-            std::clamp<std::int64_t>(parse_integer(inside).value_or(0), 0, 1 << 20));
-      }
-      word = word.substr(0, bracket);
-    }
-    word = word.substr(0, word.find("<="));  // string<=10
-    field.primitive = primitive_of(word);
-    if (field.primitive < 0) field.type = short_type(word);
-    schema.types_[current].push_back(std::move(field));
-  }
-  for (auto& [holder, fields] : schema.types_) {
-    for (Field& field : fields) {
-      if (field.primitive >= 0 || schema.types_.count(field.type) != 0) continue;
-      const std::string package = holder.substr(0, holder.find('/') + 1);
-      const std::string name = field.type == "Header" ? "std_msgs/Header" : package + field.type;
-      field.type = name;
-    }
-  }
-  RETURN_IF_ERROR(schema.check(schema.type_, 0));
-  return schema;
-}
-
-Result<MessageSchema> MessageSchema::known(const std::string& type) {
-  const Text* own = find_by(kTexts, short_type(type), &Text::type);
-  if (own == nullptr) return Error{"no definition of " + quoted_word(type) + " is known"};
-  // With all that it might hold.
-  std::string text = own->fields;
-  for (const Text& other : kTexts) {
-    if (&other != own) text += std::string("MSG: ") + other.type + "\n" + other.fields;
-  }
-  return parse(type, text);
-}
 
 class MessageDecoder {
  public:
@@ -211,6 +91,32 @@ class MessageDecoder {
     }
     if (!message(schema_.type_, "")) return error_;
     return std::move(content_);
+  }
+
+  using Read = bool (MessageDecoder::*)(const std::string& path);
+  // Null of types that hold others.
+  static Read reader_of(std::string_view primitive) {
+    using D = MessageDecoder;
+    constexpr Read kU8 = &D::number<std::uint8_t>, kI8 = &D::number<std::int8_t>;
+    static const std::map<std::string_view, Read> kReaders = {{"bool", kU8},
+                                                              {"byte", kU8},
+                                                              {"char", kU8},
+                                                              {"uint8", kU8},
+                                                              {"int8", kI8},
+                                                              {"int16", &D::number<std::int16_t>},
+                                                              {"uint16", &D::number<std::uint16_t>},
+                                                              {"int32", &D::number<std::int32_t>},
+                                                              {"uint32", &D::number<std::uint32_t>},
+                                                              {"int64", &D::number<std::int64_t>},
+                                                              {"uint64", &D::number<std::uint64_t>},
+                                                              {"float32", &D::number<float>},
+                                                              {"float64", &D::number<double>},
+                                                              // ROS 1's time is a primitive.
+                                                              {"string", &D::word},
+                                                              {"time", &D::stamp},
+                                                              {"duration", &D::stamp}};
+    const auto found = kReaders.find(primitive);
+    return found == kReaders.end() ? nullptr : found->second;
   }
 
  private:
@@ -257,18 +163,10 @@ class MessageDecoder {
   bool element(const MessageSchema::Field& field, const std::string& path) {
     // Elements without bytes cost nothing to claim.
     if (++elements_ > kMostInMessage) return fail();
-    if (field.primitive < 0) {
-      const bool time = cdr_ && (field.type == "builtin_interfaces/Time" ||
-                                 field.type == "builtin_interfaces/Duration");
-      return time ? stamp(path) : message(field.type, path);
-    }
-    const PrimitiveType& type = kPrimitives[field.primitive];
-    if (type.kind == 's') return word(path);
-    if (type.kind == 't') return stamp(path);
-    double value = 0;
-    if (!number(type, value)) return false;
-    put(path, value);
-    return true;
+    if (field.read != nullptr) return (this->*field.read)(path);
+    const bool time = cdr_ && (field.type == "builtin_interfaces/Time" ||
+                               field.type == "builtin_interfaces/Duration");
+    return time ? stamp(path) : message(field.type, path);
   }
 
   void put(const std::string& path, double value) {
@@ -294,25 +192,11 @@ class MessageDecoder {
   }
 
   template <class T>
-  bool read(double& value) {
+  bool number(const std::string& path) {
     T raw{};
     if (!take(&raw, sizeof raw)) return false;
-    value = static_cast<double>(raw);
+    put(path, static_cast<double>(raw));
     return true;
-  }
-
-  bool number(const PrimitiveType& type, double& value) {
-    if (type.kind == 'f') return type.size == 4 ? read<float>(value) : read<double>(value);
-    switch (type.size) {
-      case 1:
-        return type.kind == 'i' ? read<std::int8_t>(value) : read<std::uint8_t>(value);
-      case 2:
-        return type.kind == 'i' ? read<std::int16_t>(value) : read<std::uint16_t>(value);
-      case 4:
-        return type.kind == 'i' ? read<std::int32_t>(value) : read<std::uint32_t>(value);
-      default:
-        return type.kind == 'i' ? read<std::int64_t>(value) : read<std::uint64_t>(value);
-    }
   }
 
   const MessageSchema& schema_;
@@ -324,6 +208,100 @@ class MessageDecoder {
   MessageContent content_;
   Error error_;
 };
+
+std::string short_type(std::string_view type) {
+  std::string out(type);
+  const std::size_t at = out.find("/msg/");
+  if (at != out.npos) out.erase(at, 4);
+  return out;
+}
+
+bool serves_ground_robots(std::string_view type) {
+  static constexpr std::string_view kServed[] = {
+      "Twist",        "TwistStamped", "AckermannDrive",   "AckermannDriveStamped",
+      "Odometry",     "JointState",   "PoseStamped",      "PoseWithCovarianceStamped",
+      "Pose2D",       "TFMessage",    "TransformStamped", "Imu",
+      "BatteryState", "String"};
+  const std::string_view name = type.substr(type.rfind('/') + 1);
+  return std::find(std::begin(kServed), std::end(kServed), name) != std::end(kServed);
+}
+
+Status MessageSchema::check(const std::string& type, int depth) const {
+  const auto found = types_.find(type);
+  if (found == types_.end()) {
+    return Error{"type " + quoted_word(type_) + " needs " + quoted_word(type) +
+                 ", which its definition does not hold"};
+  }
+  if (depth > kDeepest) return Error{"type " + quoted_word(type_) + " holds itself"};
+  for (const Field& field : found->second) {
+    if (field.read != nullptr) continue;
+    RETURN_IF_ERROR(check(field.type, depth + 1));
+  }
+  return {};
+}
+
+Result<MessageSchema> MessageSchema::parse(const std::string& type, std::string_view definition) {
+  MessageSchema schema;
+  schema.type_ = short_type(type);
+  std::string current = schema.type_;
+  schema.types_[current];
+  // Types within are named with their package, or without it when it is the holder's own.
+  std::vector<std::string> defined;
+  for (std::string_view line : lines_of(definition)) {
+    if (const std::size_t hash = line.find('#'); hash != line.npos) line = line.substr(0, hash);
+    line = trimmed(line);
+    if (line.empty() || line[0] == '=') continue;
+    if (line.substr(0, 4) == "MSG:") {
+      current = short_type(trimmed(line.substr(4)));
+      schema.types_[current];
+      continue;
+    }
+    const std::size_t blank = line.find_first_of(" \t");
+    if (blank == line.npos) return Error{"found the definition line " + quoted_word(line)};
+    std::string_view word = line.substr(0, blank);
+    std::string_view name = trimmed(line.substr(blank));
+    name = name.substr(0, name.find_first_of(" \t="));
+    // Constants take no room; ROS 2's defaults stand behind a blank.
+    const std::size_t equals = line.find('=');
+    if (equals != line.npos && trimmed(line.substr(blank, equals - blank)) == name) continue;
+    Field field;
+    field.name = name;
+    if (const std::size_t bracket = word.find('['); bracket != word.npos) {
+      field.array = true;
+      const std::string_view inside = word.substr(bracket + 1, word.size() - bracket - 2);
+      if (inside.substr(0, 2) != "<=") {
+        field.fixed = static_cast<std::size_t>(
+            std::clamp<std::int64_t>(parse_integer(inside).value_or(0), 0, 1 << 20));
+      }
+      word = word.substr(0, bracket);
+    }
+    word = word.substr(0, word.find("<="));  // string<=10
+    field.read = MessageDecoder::reader_of(word);
+    if (field.read == nullptr) field.type = short_type(word);
+    schema.types_[current].push_back(std::move(field));
+  }
+  for (auto& [holder, fields] : schema.types_) {
+    for (Field& field : fields) {
+      if (field.read != nullptr || schema.types_.count(field.type) != 0) continue;
+      const std::string package = holder.substr(0, holder.find('/') + 1);
+      const std::string name = field.type == "Header" ? "std_msgs/Header" : package + field.type;
+      field.type = name;
+    }
+  }
+  RETURN_IF_ERROR(schema.check(schema.type_, 0));
+  return schema;
+}
+
+Result<MessageSchema> MessageSchema::known(const std::string& type) {
+  const Text* own = find_by(kTexts, short_type(type), &Text::type);
+  if (own == nullptr) return Error{"no definition of " + quoted_word(type) + " is known"};
+  // With all that it might hold.
+  std::string text = own->fields;
+  for (const Text& other : kTexts) {
+    if (&other != own) text += std::string("MSG: ") + other.type + "\n" + other.fields;
+  }
+  return parse(type, text);
+}
 
 Result<MessageContent> MessageSchema::decode(std::string_view bytes, MessageWire wire) const {
   return MessageDecoder(*this, bytes, wire).run();

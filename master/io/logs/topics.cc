@@ -133,4 +133,52 @@ Recording Topics::finish() {
   return std::move(recording_);
 }
 
+std::string_view ByteCursor::take(std::uint64_t count) {
+  good_ = good_ && count <= bytes_.size();
+  if (!good_) return {};
+  const std::string_view front = bytes_.substr(0, count);
+  bytes_.remove_prefix(count);
+  return front;
+}
+
+Error BagRecords::error(std::uint64_t at, const std::string& found, const std::string& expected,
+                        const char* remedy) const {
+  return Error{file_ + ":" + std::to_string(at + 1) + ": found " + found + ", expected " +
+               expected + "; " + (remedy == nullptr ? remedy_ : remedy) + " (places are bytes)"};
+}
+
+Result<std::string> BagRecords::bytes(std::uint64_t at, std::uint64_t from,
+                                      std::uint64_t length) const {
+  constexpr std::uint64_t kMostRecord = 1ull << 30;
+  if (from > source_.size() || length > source_.size() - from) return cut(at);
+  if (length > kMostRecord) {
+    return error(at, "a record of " + std::to_string(length) + " bytes", "at most 1 GiB");
+  }
+  std::string bytes;
+  if (!source_.read(from, length, bytes)) return cut(at);
+  return bytes;
+}
+
+Result<std::string> BagRecords::unpacked(std::uint64_t at, std::string_view packed,
+                                         const std::string& how, std::uint64_t size) const {
+  auto plain = decompress(packed, how, size);
+  if (plain) return plain;
+  return Error{file_ + ":" + std::to_string(at + 1) + ": " + plain.error().message + "; " +
+               remedy_};
+}
+
+Result<MessageSchema> BagRecords::schema(std::uint64_t at, const std::string& type,
+                                         const std::string& definition) const {
+  auto read = MessageSchema::parse(type, definition);
+  if (read) return read;
+  return error(at, read.error().message, "a whole definition of the message");
+}
+
+Status BagRecords::add(std::uint64_t at, const BagTopic& topic, double t_s,
+                       std::string_view message) {
+  const Status added = topics_.add(topic, t_s, message);
+  if (added) return added;
+  return Error{file_ + ":" + std::to_string(at + 1) + ": " + added.error().message};
+}
+
 }  // namespace gapfarm

@@ -1,6 +1,8 @@
 // Messages of a bag, put into one table a topic.
 #pragma once
 
+#include <cstdint>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <string>
@@ -23,6 +25,8 @@ struct MessageContent {
   std::map<std::string, std::string, std::less<>> texts;
 };
 
+class MessageDecoder;
+
 // A type with all types within it.
 class MessageSchema {
  public:
@@ -39,8 +43,8 @@ class MessageSchema {
  private:
   struct Field {
     std::string name;
-    int primitive = -1;  // index in the table of primitives
-    std::string type;    // else a type of types_
+    bool (MessageDecoder::*read)(const std::string& path) = nullptr;  // of a primitive
+    std::string type;                                                 // else one of types_
     bool array = false;
     std::size_t fixed = 0;  // elements of an array; 0: the message says
   };
@@ -94,6 +98,56 @@ class Topics {
   std::map<std::string, Rows> topics_;
   std::map<std::string, std::pair<std::string, std::size_t>> skipped_;
   std::size_t numbers_ = 0;
+};
+
+// Takes values off the front of bytes, little-endian; after one that is not there nothing is good.
+class ByteCursor {
+ public:
+  explicit ByteCursor(std::string_view bytes) : bytes_(bytes) {}
+
+  template <class T>
+  T number() {
+    T value{};
+    const std::string_view raw = take(sizeof value);
+    if (good_) std::memcpy(&value, raw.data(), sizeof value);
+    return value;
+  }
+  // With its length before it.
+  std::string_view text() { return take(number<std::uint32_t>()); }
+  std::string_view take(std::uint64_t count);
+  std::string_view rest() const { return bytes_; }
+  bool good() const { return good_; }
+
+ private:
+  std::string_view bytes_;
+  bool good_ = true;
+};
+
+// What readers of bags that are records share; `at`: a place in the file.
+class BagRecords {
+ protected:
+  // `remedy`: of a file that was damaged.
+  BagRecords(ByteSource& source, const std::string& file, const char* format, const char* remedy)
+      : source_(source), file_(file), remedy_(remedy), topics_(file, format) {}
+
+  Error error(std::uint64_t at, const std::string& found, const std::string& expected,
+              const char* remedy = nullptr) const;
+  Error cut(std::uint64_t at) const {
+    return error(at, "the end of the file within a record", "whole records");
+  }
+  // `length` bytes at `from`, of the record at `at`.  Errors: there are not, or more than 1 GiB.
+  Result<std::string> bytes(std::uint64_t at, std::uint64_t from, std::uint64_t length) const;
+  Result<std::string> unpacked(std::uint64_t at, std::string_view packed, const std::string& how,
+                               std::uint64_t size) const;
+  // A topic's schema by its definition.
+  Result<MessageSchema> schema(std::uint64_t at, const std::string& type,
+                               const std::string& definition) const;
+  Status add(std::uint64_t at, const BagTopic& topic, double t_s, std::string_view message);
+
+  ByteSource& source_;
+  const std::string& file_;
+  const char* remedy_;
+  Topics topics_;
 };
 
 // Which tables of a bag have the robot's poses in the world, and which only odometry's.
