@@ -88,7 +88,7 @@ void read_motions(TomlSection& top, const ScenarioForm& form, Config& config) {
   read_effects(top, problem.table(), problem.values);
   read_pieces(top, form, problem.pieces, problem.commands);
   if (!form.pieces) read_commands(top, problem.commands);
-  read_fitness(top, problem.fitness);
+  top.within("fitness", [&](TomlSection& section) { read_fitness(section, problem.fitness); });
   read_spread(top, problem.spread);
   read_simulate(top, problem.commands, config.simulate);
   top.find("validation");  // as [[stages]]
@@ -100,9 +100,10 @@ void search_everything(const ParameterTable& table, std::vector<Gene>& genes) {
   }
 }
 
-// `known`: none, or whose robot and program these are.
-Result<Config> parse(std::string_view text, const std::string& path, const ProgramStarter& start,
-                     const Problem* known) {
+}  // namespace
+
+Result<Config> parse_config(std::string_view text, const std::string& path,
+                            const ProgramStarter& start, const Problem* known) {
   ASSIGN_OR_RETURN(const auto parsed, parse_wanted(text, path, "a config"));
   if (parsed.contains("model")) {
     return text_error(path, {}, "a model", "a config",
@@ -154,24 +155,12 @@ Result<Config> parse(std::string_view text, const std::string& path, const Progr
   return config;
 }
 
-}  // namespace
-
 Result<std::string> start_no_program(const ExternalCommand& command) {
   return Error{"would have to start '" + command.argv[0] + "', and here nothing is started"};
 }
 
 Result<std::string> start_program(const ExternalCommand& command) {
   return ExternalSimulator(command, monotonic_seconds).introduce();
-}
-
-Result<Config> parse_config(std::string_view text, const std::string& path,
-                            const ProgramStarter& start) {
-  return parse(text, path, start, nullptr);
-}
-
-Result<Config> parse_config_of(const Problem& known, std::string_view text,
-                               const std::string& path) {
-  return parse(text, path, start_no_program, &known);
 }
 
 Result<Config> read_config(const std::string& path) {
@@ -229,8 +218,7 @@ bool is_comparison(std::string_view text) {
 }
 
 Result<Comparison> read_comparison(const std::string& path) {
-  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
-  ASSIGN_OR_RETURN(const auto parsed, parse_toml(text, path));
+  ASSIGN_OR_RETURN(const auto parsed, parse_file(path, parse_toml));
   TomlErrors errors(path);
   TomlSection top(parsed, "", errors);
   Comparison comparison;
@@ -250,8 +238,7 @@ Result<Comparison> read_comparison(const std::string& path) {
     return Error{path + ": there are no variants; add sections such as [variants.small]"};
   }
   const std::string base_path = beside(path, config);
-  ASSIGN_OR_RETURN(const auto base_text, read_text_file(base_path));
-  ASSIGN_OR_RETURN(const auto base, parse_toml(base_text, base_path));
+  ASSIGN_OR_RETURN(const auto base, parse_file(base_path, parse_toml));
   for (const auto& [name, section] : in_file_order(variants->table())) {
     if (!section->is_table()) return Error{path + ": variant \"" + name + "\" is no section"};
     ASSIGN_OR_RETURN(auto variant, read_variant(name, *section->as_table(), base, base_path, path));
@@ -270,31 +257,21 @@ class StageReader {
     }
   }
 
-  void read(const toml::node& node, std::vector<Stage>& stages) {
-    const toml::array* array = node.as_array();
-    if (array == nullptr || array->empty()) {
-      errors_.add(node, "stages is " + toml_type_name(node) + ", expected sections [[stages]]");
-      return;
-    }
+  void read(std::vector<TomlSection> sections, const toml::node& node, std::vector<Stage>& stages) {
     std::vector<bool> used(names_.size());
-    for (std::size_t i = 0; i < array->size(); ++i) {
-      const toml::table* table = array->get(i)->as_table();
-      if (table == nullptr) {
-        errors_.add(*array->get(i), "a stage is no section, expected [[stages]]");
-        continue;
-      }
-      stages.push_back(read_stage(*table, i + 1 == array->size()));
+    for (TomlSection& section : sections) {
+      stages.push_back(read_stage(section, &section == &sections.back()));
       for (const std::size_t gene : stages.back().genes) used[gene] = true;
     }
-    if (misread_) return;
+    if (misread_ || sections.empty()) return;
     for (std::size_t gene = 0; gene < used.size(); ++gene) {
       if (!used[gene]) errors_.add(node, "gene " + names_[gene] + " is in no stage; add it to one");
     }
   }
 
  private:
-  Stage read_stage(const toml::table& table, bool last) {
-    TomlSection section(table, "[[stages]]", errors_);
+  Stage read_stage(TomlSection& section, bool last) {
+    const toml::table& table = section.table();
     Stage stage;
     const auto genes = section.choices("genes", names_);
     if (genes) {
@@ -328,7 +305,8 @@ Result<StagePlan> read_stages(const Config& config) {
   TomlSection top(parsed, "", errors);
   StagePlan plan;
   if (const toml::node* node = top.find("stages")) {
-    StageReader(config, errors).read(*node, plan.stages);
+    const std::string missing = "stages is no list, expected sections [[stages]]";
+    StageReader(config, errors).read(top.sections("stages", missing), *node, plan.stages);
     if (!config.problem.fitness.objectives.empty()) {
       errors.add(*node,
                  "stages go on from one best, and a search of several objectives has a "

@@ -22,13 +22,11 @@ Result<std::string> start_program(const ExternalCommand& command);
 // Keys that the file omits keep their defaults.  The error lists everything that is wrong, a
 // line each: "file:line:column: sentence", with "did you mean" for unknown words.
 // `start` starts the simulator that scenario `external` names, and returns how it introduces
-// itself.
-Result<Config> parse_config(std::string_view text, const std::string& path,
-                            const ProgramStarter& start = start_no_program);
-// The same where the problem is known: robot and program are its own, no robot's file is read and
+// itself.  Where the problem is `known`, robot and program are its own: no robot's file is read and
 // nothing is started.
-Result<Config> parse_config_of(const Problem& known, std::string_view text,
-                               const std::string& path);
+Result<Config> parse_config(std::string_view text, const std::string& path,
+                            const ProgramStarter& start = start_no_program,
+                            const Problem* known = nullptr);
 // Looks among the shipped ones too (shipped_file).
 Result<Config> read_config(const std::string& path);
 

@@ -1,8 +1,6 @@
 // Reading models.
 #include "common/config/model.h"
 
-#include <limits>
-
 #include "common/base/build_info.h"
 #include "common/config/sections.h"
 #include "common/trials/files.h"
@@ -30,13 +28,15 @@ void read_entry(TomlSection& section, const std::string& key, std::size_t row, M
     model.values[row] =
         row_value(*value, model.table(), row, section.errors()).value_or(model.values[row]);
   }
-  const auto unit = entry.string("unit");
-  if (unit && *unit != parameter.unit) {
-    entry.fail("unit", "unit of " + parameter.key + " is " + quoted_word(*unit) + ", expected " +
+  std::string unit = parameter.unit;
+  entry.read("unit", unit);
+  if (unit != parameter.unit) {
+    entry.fail("unit", "unit of " + parameter.key + " is " + quoted_word(unit) + ", expected " +
                            quoted_word(parameter.unit) + "; convert the value");
   }
-  const auto lower = entry.number("lo", -kUnbounded, kUnbounded);
-  const auto upper = entry.number("hi", -kUnbounded, kUnbounded);
+  std::optional<double> lower, upper;
+  entry.read("lo", lower, -kUnbounded, kUnbounded);
+  entry.read("hi", upper, -kUnbounded, kUnbounded);
   if (lower.has_value() != upper.has_value()) {
     section.errors().add(*node, parameter.key + " has one end of an interval, expected lo and hi");
   } else if (lower && *lower > *upper) {
@@ -66,7 +66,7 @@ void read_model_fitness(TomlSection& top, Model& model) {
       if (!model.score)
         section.fail("value", "value is " + toml_type_name(*value) + ", expected a number");
     }
-    read_fitness_of(section, model.fitness);
+    read_fitness(section, model.fitness);
   });
 }
 
@@ -130,7 +130,9 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   }
   TomlErrors errors(path);
   TomlSection top(parsed, "", errors);
-  if (top.count("model", 0, std::numeric_limits<std::uint64_t>::max()).value_or(1) != 1) {
+  std::uint64_t version = 1;
+  top.read("model", version, 0);
+  if (version != 1) {
     top.fail("model",
              "model is of another format version, expected 1; use the program that "
              "wrote it");
@@ -143,7 +145,8 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   top.read("kind", model.kind);
   const ScenarioForm& form = scenario_form(scenario);
   if (form.robot || (form.other_robot && top.find("robot") != nullptr)) {
-    const std::string robot = top.string("robot").value_or("");
+    std::string robot;
+    top.read("robot", robot);
     RETURN_IF_ERROR(model.set_robot(robot, path + ": robot"));
     model.values = model.table().nominal();  // effects that the file omits are neutral
   }
@@ -168,9 +171,6 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   return model;
 }
 
-Result<Model> read_model(const std::string& path) {
-  ASSIGN_OR_RETURN(auto text, read_text_file(path));
-  return parse_model(text, path);
-}
+Result<Model> read_model(const std::string& path) { return parse_file(path, parse_model); }
 
 }  // namespace gapfarm

@@ -30,11 +30,7 @@ void read_commands(TomlSection& top, std::vector<CommandSpec>& commands) {
   });
 }
 
-void read_fitness(TomlSection& top, FitnessSettings& fitness) {
-  top.within("fitness", [&](TomlSection& section) { read_fitness_of(section, fitness); });
-}
-
-void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
+void read_fitness(TomlSection& section, FitnessSettings& fitness) {
   section.read("kind", fitness.kind, fitness_names());
   fitness_rows(section, fitness);
   const auto objectives = section.strings("objectives");
@@ -96,7 +92,9 @@ void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettin
                             ? section.choice("direction", kDirections).value_or(0) % 2 == 1
                             : fitness.objectives.front().maximise;
   fitness.kind = greatest ? FitnessKind::kGreatestValue : FitnessKind::kLeastValue;
-  if (section.boolean("noisy").value_or(false)) spread.kind = SpreadKind::kSampled;
+  bool noisy = false;
+  section.read("noisy", noisy);
+  if (noisy) spread.kind = SpreadKind::kSampled;
 }
 
 bool read_external_section(TomlSection& top, const std::string& config_path,
@@ -149,9 +147,8 @@ namespace {
 // A pose in a log is that of the frame in which the corners are listed, or of the centroid.
 const std::vector<std::string> kOrigins = {"frame", "centroid"};
 
-void read_piece(const toml::table& table, const toml::node& node, TomlErrors& errors,
-                std::vector<Piece>& pieces) {
-  TomlSection section(table, "[[pieces]]", errors);
+void read_piece(TomlSection& section, std::vector<Piece>& pieces) {
+  TomlErrors& errors = section.errors();
   Piece piece;
   section.read("name", piece.name);
   // check_piece() misses those that are not there.
@@ -162,11 +159,10 @@ void read_piece(const toml::table& table, const toml::node& node, TomlErrors& er
   const std::size_t origin = section.choice("origin", kOrigins).value_or(0);
   piece_rows(section, piece);
   section.finish();
-  const bool twice = std::any_of(pieces.begin(), pieces.end(),
-                                 [&](const Piece& other) { return other.name == piece.name; });
-  if (twice) errors.add(node, "piece " + quoted_word(piece.name) + " is written twice");
+  if (contains(pieces, piece.name, &Piece::name))
+    errors.add(section.table(), "piece " + quoted_word(piece.name) + " is written twice");
   if (Status s = check_piece(piece); !s) {
-    if (errors.empty()) errors.add(node, s.error().message);
+    if (errors.empty()) errors.add(section.table(), s.error().message);
     return;
   }
   if (origin == 1) {
@@ -181,21 +177,10 @@ void read_piece(const toml::table& table, const toml::node& node, TomlErrors& er
 void read_pieces(TomlSection& top, const ScenarioForm& form, std::vector<Piece>& pieces,
                  std::vector<CommandSpec>& commands) {
   if (!form.pieces) return;
-  const toml::node* node = top.find("pieces");
-  const toml::array* list = node == nullptr ? nullptr : node->as_array();
-  if (list == nullptr || list->empty()) {
-    const std::string missing = std::string("scenario ") + form.name +
-                                " needs sections [[pieces]] with name, corners, thickness and mass";
-    top.errors().add(node == nullptr ? top.table().source().begin : node->source().begin, missing);
-    return;
-  }
-  for (const toml::node& entry : *list) {
-    if (const toml::table* table = entry.as_table()) {
-      read_piece(*table, entry, top.errors(), pieces);
-    } else {
-      top.errors().add(entry, "pieces hold " + toml_type_name(entry) + ", expected [[pieces]]");
-    }
-  }
+  auto sections = top.sections(
+      "pieces", std::string("scenario ") + form.name +
+                    " needs sections [[pieces]] with name, corners, thickness and mass");
+  for (TomlSection& section : sections) read_piece(section, pieces);
   for (const Piece& piece : pieces) commands.push_back({piece.name, 0, 0, 0});
 }
 

@@ -113,34 +113,18 @@ void read_residual(TomlSection& top, Model& model) {
   if (!section) return;
   read_outliers(*section, model);
   const toml::node* node = section->find("terms");
-  const auto check = [&](const toml::source_position& place) {
-    if (!top.errors().empty()) return;
-    if (Status s = check_residual_of(model); !s) top.errors().add(place, s.error().message);
-  };
-  if (node == nullptr && model.residual.outliers) {
-    section->finish();
-    check(section->table().source().begin);
-    return;
-  }
-  const toml::array* list = node == nullptr ? nullptr : node->as_array();
-  if (list == nullptr || list->empty()) {
-    top.errors().add(node == nullptr ? section->table().source().begin : node->source().begin,
-                     "[residual] has no terms, expected sections [[residual.terms]] with frame, "
-                     "covariates, lengths, centres and weights; or leave [residual] out");
-    return;
-  }
-  for (const toml::node& entry : *list) {
-    const toml::table* table = entry.as_table();
-    if (table == nullptr) {
-      top.errors().add(
-          entry, "residual.terms holds " + toml_type_name(entry) + ", expected [[residual.terms]]");
-      continue;
-    }
-    TomlSection term(*table, "[[residual.terms]]", top.errors());
-    model.residual.field.push_back(read_term(term, model));
+  if (node != nullptr || !model.residual.outliers) {
+    auto terms = section->sections(
+        "terms",
+        "[residual] has no terms, expected sections [[residual.terms]] with frame, covariates, "
+        "lengths, centres and weights; or leave [residual] out");
+    for (TomlSection& term : terms) model.residual.field.push_back(read_term(term, model));
   }
   section->finish();
-  check(node->source().begin);
+  if (!top.errors().empty()) return;
+  if (Status s = check_residual_of(model); !s) {
+    top.errors().add(node == nullptr ? section->table() : *node, s.error().message);
+  }
 }
 
 void write_residual(const Model& model, TomlLines& out) {

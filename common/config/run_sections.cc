@@ -139,12 +139,13 @@ void read_farm(TomlSection& top, FarmSettings& to) {
   auto section = top.section("farm");
   if (!section) return;
   section->read("workers", to.workers, 0, 1024);
-  if (auto listen = section->string("listen")) {
-    if (!is_endpoint(*listen)) {
-      section->fail("listen", "listen is " + quoted_word(*listen) +
+  if (std::string listen = "ipc://"; section->find("listen") != nullptr) {
+    section->read("listen", listen);
+    if (!is_endpoint(listen)) {
+      section->fail("listen", "listen is " + quoted_word(listen) +
                                   ", expected an endpoint such as \"tcp://0.0.0.0:5555\"");
     }
-    to.listen = std::move(*listen);
+    to.listen = std::move(listen);
   }
   section->read("window", to.window, 1, 1024);
   // ZeroMQ's own heartbeat time-to-live overflows above 65.5 s.

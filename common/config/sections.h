@@ -84,9 +84,8 @@ void origin_sections(Rows& top, Of& model) {
   });
 }
 
-void read_fitness(TomlSection& top, FitnessSettings& fitness);
-// What of it a model has, too; `section` is not finished.
-void read_fitness_of(TomlSection& section, FitnessSettings& fitness);
+// In a model a value stands beside it.
+void read_fitness(TomlSection& section, FitnessSettings& fitness);
 void read_spread(TomlSection& top, SpreadSettings& spread);
 void read_evolution(TomlSection& top, EvolutionSettings& evolution);
 void read_optimiser(TomlSection& top, OptimiserSettings& optimiser);

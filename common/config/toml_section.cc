@@ -90,15 +90,6 @@ void TomlSection::wrong_type(std::string_view key, const toml::node& node,
   errors_->add(node, std::string(key) + " is " + toml_type_name(node) + ", expected " + expected);
 }
 
-template <class T>
-std::optional<T> TomlSection::typed(std::string_view key, const char* expected) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return {};
-  if (const auto* value = node->as<T>()) return value->get();
-  wrong_type(key, *node, expected);
-  return {};
-}
-
 template <class T, class One>
 std::optional<std::vector<T>> TomlSection::list(std::string_view key, One one) {
   const toml::node* node = find(key);
@@ -140,13 +131,6 @@ std::optional<std::size_t> TomlSection::choice_of(std::string_view key, const to
   return {};
 }
 
-std::optional<double> TomlSection::number(std::string_view key, double lower, double upper,
-                                          std::string_view unit) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return {};
-  return number_of(key, *node, lower, upper, unit);
-}
-
 namespace {
 
 // TOML integers end at 2^63 - 1; what is more is written as a string.
@@ -185,14 +169,6 @@ std::optional<std::uint64_t> TomlSection::count(std::string_view key, std::uint6
   }
   errors_->add(*node, std::string(key) + " is " + std::to_string(found) + ", expected " + expected);
   return {};
-}
-
-std::optional<bool> TomlSection::boolean(std::string_view key) {
-  return typed<bool>(key, "true or false");
-}
-
-std::optional<std::string> TomlSection::string(std::string_view key) {
-  return typed<std::string>(key, "a string");
 }
 
 std::optional<std::size_t> TomlSection::choice(std::string_view key,
@@ -254,25 +230,50 @@ std::optional<std::vector<std::vector<double>>> TomlSection::rows(std::string_vi
   return all;
 }
 
+std::string TomlSection::path_of(std::string_view key) const {
+  const std::string_view above = std::string_view(name_).substr(0, name_.find_last_not_of(']') + 1);
+  return name_.empty()
+             ? std::string(key)
+             : std::string(above.substr(above.find_first_not_of('['))) + "." + std::string(key);
+}
+
 std::optional<TomlSection> TomlSection::section(std::string_view key) {
   const toml::node* node = find(key);
   if (node == nullptr) return {};
-  std::string name =
-      name_.empty() ? std::string(key) : name_.substr(1, name_.size() - 2) + "." + std::string(key);
-  name = "[" + name + "]";
+  const std::string name = "[" + path_of(key) + "]";
   if (const toml::table* table = node->as_table()) return TomlSection(*table, name, *errors_);
   wrong_type(key, *node, "the section " + name);
   return {};
 }
 
+std::vector<TomlSection> TomlSection::sections(std::string_view key, const std::string& missing) {
+  const toml::node* node = find(key);
+  const toml::array* array = node == nullptr ? nullptr : node->as_array();
+  if (array == nullptr || array->empty()) errors_->add(node == nullptr ? *table_ : *node, missing);
+  std::vector<TomlSection> all;
+  for (std::size_t i = 0; array != nullptr && i < array->size(); ++i) {
+    const std::string name = "[[" + path_of(key) + "]]";
+    if (const toml::table* table = (*array)[i].as_table()) {
+      all.emplace_back(*table, name, *errors_);
+    } else {
+      wrong_type(key, (*array)[i], "sections " + name);
+    }
+  }
+  return all;
+}
+
 void TomlSection::read(std::string_view key, double& to, double lower, double upper,
                        std::string_view unit) {
-  to = number(key, lower, upper, unit).value_or(to);
+  std::optional<double> found = to;
+  read(key, found, lower, upper, unit);
+  to = *found;
 }
 
 void TomlSection::read(std::string_view key, std::optional<double>& to, double lower, double upper,
                        std::string_view unit) {
-  if (const auto value = number(key, lower, upper, unit)) to = value;
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  if (const auto value = number_of(key, *node, lower, upper, unit)) to = value;
 }
 
 void TomlSection::read(std::string_view key, unsigned& to, unsigned lower, unsigned upper) {
@@ -281,12 +282,6 @@ void TomlSection::read(std::string_view key, unsigned& to, unsigned lower, unsig
 
 void TomlSection::read(std::string_view key, std::uint64_t& to, std::uint64_t lower) {
   to = count(key, lower, std::numeric_limits<std::uint64_t>::max()).value_or(to);
-}
-
-void TomlSection::read(std::string_view key, bool& to) { to = boolean(key).value_or(to); }
-
-void TomlSection::read(std::string_view key, std::string& to) {
-  if (auto value = string(key)) to = std::move(*value);
 }
 
 void TomlSection::read(std::string_view key, std::vector<std::string>& to) {

@@ -71,13 +71,7 @@ class TomlSection {
   // it is key "b" of section "a".
   const toml::node* find(std::string_view key);
 
-  std::optional<double> number(std::string_view key, double lower, double upper,
-                               std::string_view unit = "");
-  std::optional<std::uint64_t> count(std::string_view key, std::uint64_t lower,
-                                     std::uint64_t upper);
-  std::optional<bool> boolean(std::string_view key);
-  std::optional<std::string> string(std::string_view key);
-  // Index of the value in `words`.
+  // Index of the value in `names`.
   std::optional<std::size_t> choice(std::string_view key, std::span<const std::string> names);
   // Lists; a single value counts as a list of one.
   std::optional<std::vector<std::string>> strings(std::string_view key);
@@ -89,6 +83,8 @@ class TomlSection {
   std::optional<std::vector<std::vector<double>>> rows(std::string_view key, std::size_t columns,
                                                        const std::string& expected);
   std::optional<TomlSection> section(std::string_view key);
+  // Those of [[key]], one at least; the error is `missing` where there is none.
+  std::vector<TomlSection> sections(std::string_view key, const std::string& missing);
   // Lets `use` read the section when it is there, the whole of it; whether it is.
   template <class Use>
   bool within(std::string_view key, const Use& use) {
@@ -98,7 +94,7 @@ class TomlSection {
     return own.has_value();
   }
 
-  // The same, put where they belong when the key is there.
+  // What is there, put where it belongs.
   void read(std::string_view key, double& to, double lower, double upper,
             std::string_view unit = "");
   void read(std::string_view key, std::optional<double>& to, double lower, double upper,
@@ -117,8 +113,8 @@ class TomlSection {
   void read(std::string_view key, Kind& to, std::span<const std::string> names) {
     if (const auto index = choice(key, names)) to = static_cast<Kind>(*index);
   }
-  void read(std::string_view key, bool& to);
-  void read(std::string_view key, std::string& to);
+  void read(std::string_view key, bool& to) { read_typed(key, to, "true or false"); }
+  void read(std::string_view key, std::string& to) { read_typed(key, to, "a string"); }
   void read(std::string_view key, std::vector<std::string>& to);
 
   // An error at the value of `key`, which must exist.
@@ -134,8 +130,17 @@ class TomlSection {
                                   double upper, std::string_view unit);
   std::optional<std::size_t> choice_of(std::string_view key, const toml::node& node,
                                        std::span<const std::string> names);
+  std::optional<std::uint64_t> count(std::string_view key, std::uint64_t lower,
+                                     std::uint64_t upper);
+  // The key from the top.
+  std::string path_of(std::string_view key) const;
   template <class T>
-  std::optional<T> typed(std::string_view key, const char* expected);
+  void read_typed(std::string_view key, T& to, const char* expected) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto* value = node->as<T>();
+    value == nullptr ? wrong_type(key, *node, expected) : void(to = value->get());
+  }
   // What `one` makes of every element, or of the node alone; none: of one of them nothing.
   template <class T, class One>
   std::optional<std::vector<T>> list(std::string_view key, One one);

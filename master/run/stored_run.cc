@@ -117,8 +117,8 @@ Result<Config> parse_stored(const RunInfo& info, const Problem& problem) {
   const bool has = all.is_object() && all.contains(kFolder) && all[kFolder].is_string();
   const std::string folder = has ? all[kFolder].get<std::string>() : "";
   const auto seen = [&](const std::string& path) { return has ? path_from(folder, path) : path; };
-  ASSIGN_OR_RETURN(Config config,
-                   parse_config_of(problem, info.config_text, seen(info.config_path)));
+  ASSIGN_OR_RETURN(Config config, parse_config(info.config_text, seen(info.config_path),
+                                               start_no_program, &problem));
   if (!all.is_object() || !all.value(kTrialFiles, Json()).is_array()) return config;
   config.trial_files.clear();
   for (const Json& file : all[kTrialFiles]) {

@@ -165,7 +165,8 @@ Status change_genes(const BranchOptions& options, const std::string& run, Config
     }
   }
   // A gene that was fixed before has the config's range.
-  ASSIGN_OR_RETURN(const Config first, parse_config_of(config.problem, config.text, config.path));
+  ASSIGN_OR_RETURN(const Config first,
+                   parse_config(config.text, config.path, start_no_program, &config.problem));
   for (const std::string& text : options.freed) {
     Problem freed = problem;
     RETURN_IF_ERROR(apply_genes({text}, freed, "--free"));
