@@ -1,6 +1,7 @@
 #include "common/trials/text/csv.h"
 
 #include <algorithm>
+#include <boost/locale/utf.hpp>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -118,42 +119,21 @@ class Cutter {
   std::size_t line_start_ = 0;
 };
 
-// Bytes of the UTF-8 character that `text` begins with; 0 when there is none.  Overlong forms and
-// surrogates count as none, since protobuf strings refuse them.
-std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const auto follows = [&](std::size_t i) { return i < text.size() && (byte(i) & 0xC0) == 0x80; };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  if (first >= 0xC2 && first < 0xE0) return follows(1) ? 2 : 0;
-  if (first >= 0xE0 && first < 0xF0 && follows(1) && follows(2)) {
-    const bool overlong = first == 0xE0 && byte(1) < 0xA0;
-    const bool surrogate = first == 0xED && byte(1) >= 0xA0;
-    return overlong || surrogate ? 0 : 3;
-  }
-  if (first >= 0xF0 && first < 0xF5 && follows(1) && follows(2) && follows(3)) {
-    const bool overlong = first == 0xF0 && byte(1) < 0x90;
-    const bool beyond = first == 0xF4 && byte(1) >= 0x90;
-    return overlong || beyond ? 0 : 4;
-  }
-  return 0;
-}
-
+// Overlong forms and surrogates are none, since protobuf strings refuse them.
 Status check_utf8(std::string_view text, std::string_view file) {
+  namespace utf = boost::locale::utf;
   TextPlace place;
-  std::size_t line_start = 0;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t length = utf8_length(text.substr(at));
-    if (length == 0) {
-      place.column = at - line_start + 1;
+  const char* line_start = text.begin();
+  for (const char* at = text.begin(); at != text.end();) {
+    const char* const begin = at;
+    if (!utf::is_valid_codepoint(utf::utf_traits<char>::decode(at, text.end()))) {
+      place.column = static_cast<std::size_t>(begin - line_start) + 1;
       return text_error(file, place, "a byte that is not UTF-8", "UTF-8 text",
                         "save the file as UTF-8");
     }
-    if (text[at] == '\n') {
-      ++place.line;
-      line_start = at + 1;
-    }
-    at += length;
+    if (*begin != '\n') continue;
+    ++place.line;
+    line_start = at;
   }
   return {};
 }
