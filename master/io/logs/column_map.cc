@@ -80,19 +80,13 @@ constexpr ColumnNumber kNumbers[] = {{"scale", &MappedColumn::scale, 0, 1e12},
                                      {"gear", &MappedColumn::gear, 1e-6, 1e6},
                                      {"wraps", &MappedColumn::wraps, 0, 1e12}};
 
-// As TOML's basic string.  Bags may hold any bytes: what TOML cannot hold becomes '_'.
+// Bags may hold any bytes: what is not UTF-8, which TOML has to be, becomes '_'.
 std::string quoted(const std::string& text) {
-  std::string word = "\"", plain = "\"";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const std::string escape = c == '"' || c == '\\' ? "\\" : "";
-    const bool control = byte < 0x20 || byte == 0x7f;
-    word += escape + (control ? '_' : c);
-    plain += escape + (control || byte >= 0x80 ? '_' : c);
-  }
-  word += '"';
-  plain += '"';
-  return parse_toml("k = " + word, "").ok() ? word : plain;
+  std::string word = toml_string(text);
+  if (parse_toml("k = " + word, "").ok()) return word;
+  std::ranges::replace_if(
+      word, [](char c) { return static_cast<unsigned char>(c) >= 0x80; }, '_');
+  return word;
 }
 
 void write_table(const char* name, const TableMap& table, std::string& out) {
