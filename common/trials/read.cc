@@ -134,8 +134,7 @@ void drop_without_tips(Part& part, const std::string& tips, Mistakes& mistakes) 
 
 void read_tips(std::vector<Part>& parts, std::vector<std::string>& read, Mistakes& mistakes) {
   for (const auto& [file, of] : companions(parts, "tips.csv", &ReadableLog::tips)) {
-    std::error_code code;
-    if (fs::exists(file, code)) {
+    if (is_there(file)) {
       add_file(file.string(), of, add_tips, read, mistakes);
       if (!mistakes.status().ok()) continue;
       for (Part* part : of) drop_without_tips(*part, file.string(), mistakes);
@@ -151,8 +150,7 @@ void read_tips(std::vector<Part>& parts, std::vector<std::string>& read, Mistake
 // A paths.csv that does not say that it belongs to a log may be anybody's: a simulation's, say.
 void read_paths_beside(std::vector<Part>& parts, TrialLog& log, Mistakes& mistakes) {
   for (const auto& [file, of] : companions(parts, "paths.csv", &ReadableLog::paths)) {
-    std::error_code code;
-    if (!fs::exists(file, code)) continue;
+    if (!is_there(file)) continue;
     const auto text = read_text_file(file.string());
     if (!text.ok()) {
       mistakes.add_file(text.error());
@@ -223,14 +221,6 @@ Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
                               std::span<const std::string> commands, const ReadOptions& options) {
   Mistakes mistakes(options.skip_invalid);
   return finished(parse_trial_rows(text, file, commands, mistakes), mistakes);
-}
-
-Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands) {
-  if (auto text = read_text_file(path); text.ok()) {
-    const TextFormat format = sniff_format(*text);
-    if (format != TextFormat::kTrialLog) return wrong_format(path, format, "a trial log");
-  }
-  return read_trial_files(std::vector<std::string>{path}, commands);
 }
 
 Result<TrialLog> read_trial_files(std::span<const std::string> paths,

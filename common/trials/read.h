@@ -30,9 +30,6 @@ Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
                               std::span<const std::string> commands,
                               const ReadOptions& options = {});
 
-// A trials.csv with the paths.csv beside it that belongs to it, when there is one.
-Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands);
-
 // Several files as one log, in the order given; each may be a trials.csv, a pushes.csv (with the
 // tips.csv beside it) or a bbautotune run, distinguished by content.  A session split over files is
 // put together in trial order.  Errors beside the formats' own: no files, a (session, trial) in two

@@ -94,7 +94,7 @@ std::string beside(const std::string& path, const char* name) {
 
 std::string format_trials(const TrialLog& log) {
   const bool pushes = log.has_tips();
-  std::string text = header(pushes ? push_columns() : trial_columns(), log.extra_columns);
+  std::string text = header(pushes ? kPushColumns : kTrialColumns, log.extra_columns);
   for (const Trial& trial : log.trials) {
     text += csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
     if (!pushes) text += optional_double(trial.t_s) + ",";
@@ -109,12 +109,12 @@ std::string format_trials(const TrialLog& log) {
 }
 
 std::string format_paths(const TrialLog& log) {
-  return format_samples(log, path_columns(), &Trial::path,
+  return format_samples(log, kPathColumns, &Trial::path,
                         [](const PathSample& sample) { return pose_fields(sample.pose); });
 }
 
 std::string format_tips(const TrialLog& log) {
-  return format_samples(log, tip_columns(), &Trial::tip, [](const TipSample& sample) {
+  return format_samples(log, kTipColumns, &Trial::tip, [](const TipSample& sample) {
     return format_double(sample.x) + "," + format_double(sample.y);
   });
 }

@@ -16,7 +16,7 @@ struct SessionState {
 class TrialParser {
  public:
   TrialParser(const LogForm& form, const std::string& file, std::span<const std::string> commands)
-      : form_(form), columns_(form.columns()), file_(file), commands_(commands) {}
+      : form_(form), columns_(*form.columns), file_(file), commands_(commands) {}
 
   TrialLog parse(std::string_view text, Mistakes& mistakes) {
     TrialLog log;
@@ -119,7 +119,7 @@ struct SampleForm {
   TextFormat format;
   const char* expected;
   const char* rows_are;  // "path", for the note on rows without a trial
-  const std::vector<std::string>& (*columns)();
+  const std::vector<std::string>* columns;
   Sample (*read)(CsvRowReader& reader);
   std::vector<Sample> Trial::*member;
   bool times_repeat;  // whether two samples may have one time
@@ -138,7 +138,7 @@ void read_row(const SampleForm<Sample>& form, const CsvRow& row, const CsvHeader
   if (Status width = check_width(row, header, file); !width.ok()) {
     return mistakes.add_row({width.error()});
   }
-  CsvRowReader reader(row, header, form.columns(), file);
+  CsvRowReader reader(row, header, *form.columns, file);
   const TrialKey key{reader.word(kPathSession), reader.integer(kPathTrial)};
   const Sample sample = form.read(reader);
   if (!reader.errors().empty()) return mistakes.add_row(reader.errors());
@@ -191,7 +191,7 @@ void add_samples(const SampleForm<Sample>& form, std::string_view text, const st
   }
   auto rows = parse_csv(text, file);
   if (!rows.ok()) return mistakes.add_file(rows.error());
-  auto header = CsvHeader::match(rows->front(), form.columns(), file, form.expected);
+  auto header = CsvHeader::match(rows->front(), *form.columns, file, form.expected);
   if (!header.ok()) return mistakes.add_file(header.error());
   ReadSamples<Sample> samples;
   for (std::size_t i = 1; i < rows->size(); ++i) {
@@ -228,14 +228,14 @@ PathSample read_path_sample(CsvRowReader& reader) {
 
 TipSample read_tip_sample(CsvRowReader& reader) {
   const double t_s = sample_time(reader);
-  return {t_s, reader.coordinate(kTipX), reader.coordinate(kTipY),
+  return {t_s, reader.coordinate(kPathX), reader.coordinate(kPathY),
           reader.field(kPathTime).place.line};
 }
 
 }  // namespace
 
 const LogForm kTrialLogForm{.format = TextFormat::kTrialLog,
-                            .columns = trial_columns,
+                            .columns = &kTrialColumns,
                             .command = kCommand,
                             .command_is = "a command of the scenario",
                             .command_remedy = "write one of those it knows",
@@ -245,7 +245,7 @@ const LogForm kTrialLogForm{.format = TextFormat::kTrialLog,
 
 const LogForm kPushLogForm{
     .format = TextFormat::kPushLog,
-    .columns = push_columns,
+    .columns = &kPushColumns,
     .command = 2,
     .command_is = "a piece of the config",
     .command_remedy = "push logs belong to scenario push, whose [[pieces]] they name",
@@ -272,7 +272,7 @@ void add_paths(std::string_view text, const std::string& file, const std::vector
   const SampleForm<PathSample> form{TextFormat::kPaths,
                                     "the paths of a trial log (columns session,trial,t,x,y,theta)",
                                     "path",
-                                    path_columns,
+                                    &kPathColumns,
                                     read_path_sample,
                                     &Trial::path,
                                     true};
@@ -284,7 +284,7 @@ void add_tips(std::string_view text, const std::string& file, const std::vector<
   const SampleForm<TipSample> form{TextFormat::kTips,
                                    "the finger paths of a push log (columns session,trial,t,x,y)",
                                    "tip",
-                                   tip_columns,
+                                   &kTipColumns,
                                    read_tip_sample,
                                    &Trial::tip,
                                    false};

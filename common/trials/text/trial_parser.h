@@ -33,31 +33,18 @@ enum TrialColumn : std::size_t {
   kY1,
   kTheta1
 };
-inline const std::vector<std::string>& trial_columns() {
-  static const std::vector<std::string> names = {
-      "session", "trial", "t",      "command", "left", "right", "duration",
-      "x0",      "y0",    "theta0", "x1",      "y1",   "theta1"};
-  return names;
-}
+inline const std::vector<std::string> kTrialColumns = {
+    "session", "trial", "t",      "command", "left", "right", "duration",
+    "x0",      "y0",    "theta0", "x1",      "y1",   "theta1"};
 
+// Of paths, and of fingers' ways but for the heading.
 enum PathColumn : std::size_t { kPathSession, kPathTrial, kPathTime, kPathX, kPathY, kPathTheta };
-inline const std::vector<std::string>& path_columns() {
-  static const std::vector<std::string> names = {"session", "trial", "t", "x", "y", "theta"};
-  return names;
-}
+inline const std::vector<std::string> kPathColumns = {"session", "trial", "t", "x", "y", "theta"};
+inline const std::vector<std::string> kTipColumns = {"session", "trial", "t", "x", "y"};
 
 // Of a push log; the piece stands where a trial log has its command.
-inline const std::vector<std::string>& push_columns() {
-  static const std::vector<std::string> names = {"session", "trial", "object", "x0",    "y0",
-                                                 "theta0",  "x1",    "y1",     "theta1"};
-  return names;
-}
-
-enum TipColumn : std::size_t { kTipSession, kTipTrial, kTipTime, kTipX, kTipY };
-inline const std::vector<std::string>& tip_columns() {
-  static const std::vector<std::string> names = {"session", "trial", "t", "x", "y"};
-  return names;
-}
+inline const std::vector<std::string> kPushColumns = {"session", "trial", "object", "x0",    "y0",
+                                                      "theta0",  "x1",    "y1",     "theta1"};
 
 using TrialKey = std::pair<std::string, std::int64_t>;
 
@@ -71,7 +58,7 @@ inline constexpr double kLongestCommand_s = 60;
 // Where a kind of log keeps what, as positions in its `columns`; all begin with session and trial.
 struct LogForm {
   TextFormat format;
-  const std::vector<std::string>& (*columns)();
+  const std::vector<std::string>* columns;
   std::size_t command;               // the word in it is one of the scenario's commands
   const char* command_is;            // "a command of the scenario"
   const char* command_remedy;        // "write one of those it knows"

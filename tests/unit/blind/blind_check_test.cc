@@ -102,7 +102,8 @@ TEST_F(BlindCheck, ScoresWhatTheDiagnosesReport) {
               ".\n..\ntrials.csv\n");
     const auto names = std::vector<std::string>{"forward", "backward", "turn_ccw",
                                                 "turn_cw", "wide_ccw", "wide_cw"};
-    const auto log = read_trials(settings_.out + "/cases/" + c.truth.id + "/trials.csv", names);
+    const auto log = read_trial_files(
+        std::vector<std::string>{settings_.out + "/cases/" + c.truth.id + "/trials.csv"}, names);
     ASSERT_TRUE(log.ok());
     EXPECT_EQ(log->trials.size(), 24u);
   }

@@ -28,7 +28,7 @@ std::vector<DrivenCommand> commands_of(const TrialLog& log) {
 void expect_round_trip(const TrialLog& log) {
   TemporaryFolder folder;
   ASSERT_TRUE(write_trials(log, folder / "trials.csv").ok());
-  const auto again = read_trials(folder / "trials.csv", kCommands);
+  const auto again = read_trial_files(std::vector<std::string>{folder / "trials.csv"}, kCommands);
   ASSERT_TRUE(again.ok()) << again.error().message;
   EXPECT_EQ(format_trials(log), format_trials(*again));
 }
@@ -86,7 +86,7 @@ TEST(RealLogs, PracticeCasesAreChainsOfFour) {
     const std::filesystem::path file = entry.path() / "trials.csv";
     if (!std::filesystem::exists(file)) continue;
     ++cases;
-    const auto log = read_trials(file.string(), kCommands);
+    const auto log = read_trial_files(std::vector<std::string>{file.string()}, kCommands);
     ASSERT_TRUE(log.ok()) << log.error().message;
     EXPECT_EQ(log->trials.size(), 600u);
     const auto contexts = trial_contexts(*log, commands_of(*log));
@@ -102,18 +102,19 @@ TEST(RealLogs, PracticeCasesAreChainsOfFour) {
 
 TEST(RealLogs, OtherExperimentsAreNamed) {
   const std::pair<const char*, const char*> others[] = {
-      {"srv1_paths/waypoint_1.log", "a blendersim way-point log"},
-      {"pushing_cmu/pushes.csv", "a push log"},
-      {"pushing_cmu/tips.csv", "the finger paths of a push log"},
-      {"racquetball/2013_11_22_00_18_36.Standard_See_README.csv", "a racquetball trajectory"},
+      {"srv1_paths/waypoint_1.log", "found a blendersim way-point log"},
+      {"pushing_cmu/pushes.csv", "push logs belong to scenario push"},
+      {"pushing_cmu/tips.csv", "found the finger paths of a push log"},
+      {"racquetball/2013_11_22_00_18_36.Standard_See_README.csv", "found a racquetball trajectory"},
   };
   for (const auto& [file, name] : others) {
     const std::filesystem::path path(file);
     const auto folder = shared_data(path.parent_path().string());
     if (!folder) GTEST_SKIP() << "no shared data beside the sources";
-    const auto log = read_trials((*folder / path.filename()).string(), kCommands);
+    const auto log =
+        read_trial_files(std::vector<std::string>{(*folder / path.filename()).string()}, kCommands);
     ASSERT_FALSE(log.ok());
-    EXPECT_THAT(log.error().message, testing::HasSubstr(std::string("found ") + name));
+    EXPECT_THAT(log.error().message, testing::HasSubstr(name));
   }
 }
 

@@ -74,7 +74,7 @@ TEST(WriteTrials, ReadsBackToTheBit) {
   const std::string path = folder / "new/folder/trials.csv";
   const Status status = write_trials(log, path);
   ASSERT_TRUE(status.ok()) << status.error().message;
-  const auto again = read_trials(path, kCommands);
+  const auto again = read_trial_files(std::vector<std::string>{path}, kCommands);
   ASSERT_TRUE(again.ok()) << again.error().message;
   expect_same(log, *again);
   EXPECT_EQ(format_trials(log), format_trials(*again));
@@ -120,14 +120,15 @@ TEST(WriteTrials, PathsBelongToTheLogThatTheyWereWrittenWith) {
   TrialLog log = awkward_log();
   ASSERT_TRUE(write_trials(log, folder / "trials.csv").ok());
   std::filesystem::rename(folder / "trials.csv", folder / "renamed.csv");
-  const auto renamed = read_trials(folder / "renamed.csv", kCommands);
+  const auto renamed =
+      read_trial_files(std::vector<std::string>{folder / "renamed.csv"}, kCommands);
   ASSERT_TRUE(renamed.ok()) << renamed.error().message;
   EXPECT_TRUE(renamed->has_paths());
 
   log.trials[0].path.clear();
   log.trials[0].X_WE.x += 1;
   ASSERT_TRUE(write_trials(log, folder / "trials.csv").ok());
-  const auto again = read_trials(folder / "trials.csv", kCommands);
+  const auto again = read_trial_files(std::vector<std::string>{folder / "trials.csv"}, kCommands);
   ASSERT_TRUE(again.ok()) << again.error().message;
   EXPECT_FALSE(again->has_paths());
   EXPECT_THAT(again->notes, testing::ElementsAre(HasSubstr("trials.csv has changed since")));
