@@ -40,6 +40,8 @@ void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& comma
   to.emplace_back("seed", std::to_string(config.seed));
 }
 
+namespace {
+
 std::string diagnosis_summary(const Diagnosis& d) {
   std::string text = d.headline + "\n  " + d.action + "\n";
   for (const SanityFinding& f : d.sanity) {
@@ -58,9 +60,7 @@ std::string diagnosis_summary(const Diagnosis& d) {
         text += fmt::format(" (bound {:.3g}, {:.1f} times as wide)", *p.bound, *p.width_over_bound);
       }
     }
-    for (std::size_t i = 0; i < e.aliases.size(); ++i) {
-      text += (i == 0 ? "; not distinguished from " : ", ") + e.aliases[i];
-    }
+    if (!e.aliases.empty()) text += "; not distinguished from " + joined(e.aliases);
     text += "\n";
   }
   text += fmt::format(
@@ -86,11 +86,25 @@ std::string diagnosis_summary(const Diagnosis& d) {
   return text;
 }
 
+// diagnosis.json without its trials.
 Json diagnosis_summary_json(const Diagnosis& diagnosis, const DiagnoseCommand& command) {
   auto json = parse_json(to_json(diagnosis));
   json.erase("trials");
   json["out"] = command.out;
   return json;
+}
+
+}  // namespace
+
+Status leave_diagnosis(const DiagnoseCommand& command, const Diagnosis& diagnosis,
+                       Outputs::NamedTexts files, const std::string& left, Console& console) {
+  files.emplace_back("report.html", report_html(diagnosis));
+  // Last: whoever sees it sees the rest.
+  files.emplace_back(kDiagnosisFile, to_json(diagnosis));
+  RETURN_IF_ERROR(command.outputs.write_in(command.out, files));
+  console.result(diagnosis_summary(diagnosis), diagnosis_summary_json(diagnosis, command));
+  console.note("wrote: " + command.out + "/report.html, diagnosis.json, " + left);
+  return {};
 }
 
 namespace {
@@ -111,6 +125,13 @@ Model model_of(const Config& config, const DiagnosisResult& result, const Parame
 Status write_models(const Config& config, const DiagnoseCommand& command,
                     const DiagnosisResult& result) {
   const std::filesystem::path out(command.out);
+  if (result.diagnosis.verdict == Verdict::kUnusable) {
+    // Those of a diagnosis that this one replaces are not of it.
+    std::error_code ignored;
+    for (const char* name : {"model.toml", "tuned.toml"})
+      std::filesystem::remove(out / name, ignored);
+    return {};
+  }
   Model model = model_of(config, result, result.final_, "diagnosed");
   model.residual = result.residual;
   model.intervals.resize(model.values.size());
@@ -121,27 +142,6 @@ Status write_models(const Config& config, const DiagnoseCommand& command,
   RETURN_IF_ERROR(command.outputs.write_model((out / "model.toml").string(), model));
   const Model tuned = model_of(config, result, result.tuned, "tuned");
   return command.outputs.write_model((out / "tuned.toml").string(), tuned);
-}
-
-bool has_models(const DiagnosisResult& result) {
-  return result.diagnosis.verdict != Verdict::kUnusable;
-}
-
-Status write_all(const Config& config, const DiagnoseCommand& command,
-                 const DiagnosisResult& result) {
-  const std::filesystem::path out(command.out);
-  if (has_models(result)) {
-    RETURN_IF_ERROR(write_models(config, command, result));
-  } else {
-    // Those of a diagnosis that this one replaces are not of it.
-    std::error_code ignored;
-    for (const char* name : {"model.toml", "tuned.toml"})
-      std::filesystem::remove(out / name, ignored);
-  }
-  RETURN_IF_ERROR(
-      command.outputs.write((out / "report.html").string(), report_html(result.diagnosis)));
-  // Last: whoever sees it sees the rest.
-  return command.outputs.write((out / kDiagnosisFile).string(), to_json(result.diagnosis));
 }
 
 Provenance stamp_of(const Config& config, const DiagnoseCommand& command,
@@ -253,11 +253,10 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
     result.diagnosis.provenance.emplace_back("predictions of " + fit,
                                              fmt::format("{}, questions {}", kAnswers, questions));
   }
-  RETURN_IF_ERROR(write_all(config, command, result));
-  context.console.result(diagnosis_summary(result.diagnosis),
-                         diagnosis_summary_json(result.diagnosis, command));
-  context.console.note("wrote: " + command.out + "/report.html, diagnosis.json" +
-                       (has_models(result) ? ", model.toml" : ""));
+  RETURN_IF_ERROR(write_models(config, command, result));
+  const bool usable = result.diagnosis.verdict != Verdict::kUnusable;
+  RETURN_IF_ERROR(leave_diagnosis(command, result.diagnosis, {},
+                                  usable ? "model.toml" : "and no model", context.console));
   return asked->given_up() > 0 ? kExitQuarantined : kExitDone;
 }
 

@@ -31,9 +31,10 @@ struct DiagnoseCommand : LongOptions {
 void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& command,
                               Diagnosis* diagnosis);
 
-std::string diagnosis_summary(const Diagnosis& diagnosis);
-// diagnosis.json without its trials.
-Json diagnosis_summary_json(const Diagnosis& diagnosis, const DiagnoseCommand& command);
+// Leaves `files`, report.html and diagnosis.json, and shows what was found.  `left`: of the files,
+// for people.
+Status leave_diagnosis(const DiagnoseCommand& command, const Diagnosis& diagnosis,
+                       Outputs::NamedTexts files, const std::string& left, Console& console);
 
 // Reads the log that --reference names, if it does.  Errors: the scenario is not of ground robots;
 // a model whose log is gone.

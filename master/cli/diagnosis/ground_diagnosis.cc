@@ -4,16 +4,15 @@
 #include "common/base/hash.h"
 #include "common/problem/problem.h"
 #include "common/robot/robot.h"
+#include "common/trials/files.h"
 #include "master/cli/diagnosis/diagnose_command.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/provenance.h"
-#include "master/diagnose/result/diagnosis_json.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/fit_file.h"
 #include "master/ground/fit/window_fit.h"
 #include "master/ground/program_runs.h"
-#include "master/report/report_html.h"
 
 namespace gapfarm {
 namespace {
@@ -26,9 +25,8 @@ constexpr const char* kFits = "fits.jsonl";
 Result<std::vector<std::string>> reference_folders(const std::vector<std::string>& named,
                                                    Console& console) {
   std::vector<std::string> folders;
-  std::error_code ignored;
   for (const std::string& name : named) {
-    if (fs::exists(fs::path(name) / "commands.csv", ignored)) {
+    if (is_there(fs::path(name) / "commands.csv")) {
       folders.push_back(name);
       continue;
     }
@@ -38,7 +36,7 @@ Result<std::vector<std::string>> reference_folders(const std::vector<std::string
                    "nor a run or model (" + model.error().message + ")"};
     }
     for (const std::string& folder : model->data.files) {
-      if (fs::exists(fs::path(folder) / "commands.csv", ignored)) {
+      if (is_there(fs::path(folder) / "commands.csv")) {
         folders.push_back(folder);
         continue;
       }
@@ -132,13 +130,9 @@ Result<int> run_diagnose_runs(DiagnoseCommand& command, const Config& config,
   for (const std::string& name : command.reference) {
     result->diagnosis.provenance.emplace_back("reference", name);
   }
-  files.push_back({"report.html", report_html(result->diagnosis)});
-  files.push_back({kDiagnosisFile, to_json(result->diagnosis)});
-  RETURN_IF_ERROR(command.outputs.write_in(command.out, files));
+  RETURN_IF_ERROR(leave_diagnosis(command, result->diagnosis, std::move(files), "and " + left,
+                                  context.console));
   if (fits) fits->remove();
-  context.console.result(diagnosis_summary(result->diagnosis),
-                         diagnosis_summary_json(result->diagnosis, command));
-  context.console.note("wrote: " + command.out + "/report.html, diagnosis.json, and " + left);
   return kExitDone;
 }
 
