@@ -81,10 +81,8 @@ Result<GroundReference> fit_source(const GroundSource& source, Console& console)
 
 Result<std::optional<ReportedValues>> values_in(const std::string& folder) {
   const auto path = std::filesystem::path(folder) / "values.json";
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) return std::optional<ReportedValues>();
-  ASSIGN_OR_RETURN(const auto text, read_text_file(path.string()));
-  ASSIGN_OR_RETURN(auto values, parse_values(text, path.string()));
+  if (!is_there(path)) return std::optional<ReportedValues>();
+  ASSIGN_OR_RETURN(auto values, parse_file(path.string(), parse_values));
   return std::optional(std::move(values));
 }
 
@@ -130,20 +128,11 @@ Result<RosExport> read_source_of_export(const std::string& source, Console& cons
   return RosExport{source, "", std::move(values), fit.covariance, friction, {}};
 }
 
-std::string usual_controller(DriveKind drive) {
-  switch (drive) {
-    case DriveKind::kMecanum:
-      return "mecanum_drive_controller";
-    case DriveKind::kOmni:
-      return "omni_wheel_drive_controller";
-    case DriveKind::kAckermann:
-      return "ackermann_steering_controller";
-    case DriveKind::kTricycle:
-      return "tricycle_steering_controller";
-    default:
-      return "diff_drive_controller";
-  }
-}
+// By DriveKind.
+constexpr const char* kUsualControllers[] = {
+    "diff_drive_controller",       "diff_drive_controller",    "diff_drive_controller",
+    "omni_wheel_drive_controller", "mecanum_drive_controller", "ackermann_steering_controller",
+    "tricycle_steering_controller"};
 
 Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, RosExport* data) {
   if (urdf.empty()) {
@@ -152,8 +141,7 @@ Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, 
     }
     return {};
   }
-  ASSIGN_OR_RETURN(const auto text, read_text_file(urdf));
-  ASSIGN_OR_RETURN(const auto model, parse_urdf(text, urdf));
+  ASSIGN_OR_RETURN(const auto model, parse_file(urdf, parse_urdf));
   ASSIGN_OR_RETURN(const auto reading, understand_robot(model, {}));
   for (std::size_t i = 0; i < reading.sources.size(); ++i) {
     const WheelSource& source = reading.sources[i];
@@ -186,10 +174,9 @@ Status check_controller(const DriveFacts& file, const GroundRobot& robot,
 Result<RosExport> export_of(const ExportCommand& command, Console& console) {
   ASSIGN_OR_RETURN(auto data, read_source_of_export(command.source, console));
   const GroundRobot& robot = data.reported.given;
-  data.controller = usual_controller(robot.drive);
+  data.controller = kUsualControllers[static_cast<std::size_t>(robot.drive)];
   if (!command.controllers.empty()) {
-    ASSIGN_OR_RETURN(const auto text, read_text_file(command.controllers));
-    ASSIGN_OR_RETURN(const auto read, parse_controllers(text, command.controllers));
+    ASSIGN_OR_RETURN(const auto read, parse_file(command.controllers, parse_controllers));
     data.controller = read.drives.front().name;
     RETURN_IF_ERROR(check_controller(read.drives.front(), robot, ros_values(data.reported)));
   }

@@ -20,27 +20,19 @@ std::vector<std::string> identified_by_driving(const GroundRobot& robot) {
   for (const RobotWheel& w : robot.wheels) {
     if (w.driven && groups.insert(w.group).second) keys.push_back("wheels." + w.group + ".radius");
   }
-  switch (robot.drive) {
-    case DriveKind::kSkid:
-      keys.insert(keys.end(), {"friction_ratio", "friction", "creep"});
-      break;
-    case DriveKind::kTracked:
-      keys.insert(keys.end(), {"contact_length", "friction_ratio", "friction", "creep"});
-      break;
-    case DriveKind::kOmni:
-      keys.insert(keys.end(), {"robot_radius", "roller_drag"});
-      break;
-    case DriveKind::kMecanum:
-      keys.insert(keys.end(),
-                  {"wheel_separation", "roller_drag", "friction", "creep_speed", "cross_load"});
-      break;
-    case DriveKind::kDifferential:
-      keys.insert(keys.end(), {"wheel_separation"});
-      break;
-    default:
-      keys.insert(keys.end(), {"steering.offset", "steering.gain", "understeer", "friction",
-                               "throttle.gain", "throttle.drag"});
-  }
+  static const std::vector<std::string> kOfCars = {"steering.offset", "steering.gain",
+                                                   "understeer",      "friction",
+                                                   "throttle.gain",   "throttle.drag"};
+  static const std::vector<std::string> kByDriveKind[] = {
+      {"wheel_separation"},
+      {"friction_ratio", "friction", "creep"},
+      {"contact_length", "friction_ratio", "friction", "creep"},
+      {"robot_radius", "roller_drag"},
+      {"wheel_separation", "roller_drag", "friction", "creep_speed", "cross_load"},
+      kOfCars,
+      kOfCars};
+  const auto& own = kByDriveKind[static_cast<std::size_t>(robot.drive)];
+  keys.insert(keys.end(), own.begin(), own.end());
   keys.insert(keys.end(), {"delay", "lag", "marker.x", "marker.y", kGroundTravelNoise,
                            kGroundTurnNoise, kGroundPositionNoise, kGroundHeadingNoise});
   return keys;
@@ -185,9 +177,7 @@ std::string config_of_robot(const GroundRobot& robot, const RobotConfigTexts& te
 std::string describe_robot(const RobotReading& reading, const GroundRobot& completed) {
   const std::string drive = drive_names()[static_cast<std::size_t>(completed.drive)];
   std::string text = (completed.name.empty() ? "the robot" : completed.name) + ": drive " + drive;
-  for (std::size_t i = 0; i < reading.evidence.size(); ++i) {
-    text += (i == 0 ? ", because " : "; ") + reading.evidence[i];
-  }
+  if (!reading.evidence.empty()) text += ", because " + joined(reading.evidence, "; ");
   text += "\n";
   if (!reading.base_link.empty()) {
     text += "frame: x ahead, y left, origin on the floor at x " + number(reading.X_BR.x) + ", y " +
