@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 #include <thread>
 
 #include "common/base/build_info.h"
@@ -23,16 +24,10 @@ namespace {
 constexpr std::size_t kMostFilesShown = 12;
 
 LogLevel level_of(FarmEvent::Kind kind) {
-  switch (kind) {
-    case FarmEvent::kJoined:
-    case FarmEvent::kReturned:
-    case FarmEvent::kLeft:
-      return LogLevel::kInfo;
-    case FarmEvent::kQuarantined:
-      return LogLevel::kError;
-    default:
-      return LogLevel::kWarn;
-  }
+  if (kind == FarmEvent::kQuarantined) return LogLevel::kError;
+  const bool as_usual =
+      kind == FarmEvent::kJoined || kind == FarmEvent::kReturned || kind == FarmEvent::kLeft;
+  return as_usual ? LogLevel::kInfo : LogLevel::kWarn;
 }
 
 }  // namespace
@@ -239,10 +234,8 @@ std::size_t count_sessions(const TrialLog& log) {
 void show_notes(const TrialLog& log, Console& console) {
   for (const std::string& note : log.notes) console.note(note);
   if (log.files.empty()) return;
-  std::string text = "read ";
-  for (std::size_t i = 0; i < log.files.size() && i < kMostFilesShown; ++i) {
-    text += (i > 0 ? ", " : "") + log.files[i];
-  }
+  const std::size_t shown = std::min(log.files.size(), kMostFilesShown);
+  std::string text = "read " + joined(std::span(log.files).first(shown));
   if (log.files.size() > kMostFilesShown) {
     text += " and " + std::to_string(log.files.size() - kMostFilesShown) + " files more";
   }
@@ -276,14 +269,13 @@ void show_warnings(const Problem& problem, const std::vector<std::string>& runs,
 Result<Model> find_model(const std::string& run_or_model, Console& console) {
   namespace fs = std::filesystem;
   const fs::path path(run_or_model);
-  std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return read_model(run_or_model);
+  if (!is_folder(path)) return read_model(run_or_model);
   const fs::path file = path / "model.toml";
   std::optional<Model> left;
-  if (fs::exists(file, ignored)) {
+  if (is_there(file)) {
     ASSIGN_OR_RETURN(left, read_model(file.string()));
   }
-  if (!fs::exists(run_store_file(path), ignored)) {
+  if (!is_there(run_store_file(path))) {
     if (left) return *std::move(left);
     return Error{run_or_model +
                  ": has neither a model.toml nor a run in it; give a model file or the folder of a "
@@ -385,7 +377,7 @@ void report_to(Console& console, SocketFarmOptions& options) {
 
 Result<FittedRuns> open_fitted(const std::string& source, const std::vector<std::string>& folders,
                                Console& console) {
-  if (std::error_code ignored; !std::filesystem::is_directory(source, ignored)) {
+  if (!is_folder(source)) {
     ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {.files = folders, .read = {}}));
     return FittedRuns{config.problem, config.problem.values, config.windows, config.trial_files,
                       config.robot_path};

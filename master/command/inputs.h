@@ -96,11 +96,11 @@ Result<Config> open_config(const std::string& config_path, const TrialOptions& t
 // --workers, --listen and what goes with them.
 struct FarmOptions {
   int workers = -1;  // -1: as the config says, else one a core
-  std::vector<std::string> listen;
+  std::vector<std::string> listen = {};
   std::string keys = KeyFolder::default_path();
   bool insecure = false;
   bool insecure_anywhere = false;
-  LogFlags log;
+  LogFlags log = {};
 
   void declare(CLI::App& app, bool remote);
 };

@@ -53,18 +53,16 @@ bool same_file(const std::string& a, const std::string& b) {
 // The folder that a file would be made in, or the nearest one above that is there.
 fs::path standing_folder(const fs::path& path) {
   fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  std::error_code code;
-  while (!fs::exists(folder, code) && folder.has_parent_path() && folder != folder.parent_path()) {
+  while (!is_there(folder) && folder.has_parent_path() && folder != folder.parent_path()) {
     folder = folder.parent_path();
   }
-  return fs::exists(folder, code) ? folder : fs::path(".");
+  return is_there(folder) ? folder : fs::path(".");
 }
 
 // Permissions alone do not decide (root, read-only mounts): tries it.
 Status check_writable(const std::string& path) {
   const fs::path folder = standing_folder(path);
-  std::error_code code;
-  if (!fs::is_directory(folder, code)) {
+  if (!is_folder(folder)) {
     return Error{path + ": " + folder.string() + " is no folder; give another name"};
   }
   std::string trial = (folder / ".gapfarm-XXXXXX").string();
@@ -94,8 +92,7 @@ bool is_in_place(const std::string& path) {
 }  // namespace
 
 Status check_folder(const std::string& folder, FolderKind kind) {
-  std::error_code code;
-  if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
+  if (is_there(folder) && !is_folder(folder)) {
     return Error{folder + ": is a file, expected a folder; choose another --out"};
   }
   const std::string command = command_in(folder);
@@ -105,7 +102,7 @@ Status check_folder(const std::string& folder, FolderKind kind) {
                  "` simulated, and nothing else belongs there; choose another --out"};
   }
   for (const Marker& marker : kMarkers) {
-    if (marker.kind == kind || !fs::exists(fs::path(folder) / marker.file, code)) continue;
+    if (marker.kind == kind || !is_there(fs::path(folder) / marker.file)) continue;
     const bool of_another = !command.empty() && command != "diagnose";
     if (std::string_view(marker.file) == "simulations.sqlite" && of_another) continue;
     return Error{folder + ": holds " + marker.label +
@@ -148,14 +145,13 @@ Status Outputs::check(const std::string& path, bool replace) const {
   if (input != inputs_.end()) {
     return Error{path + ": is read by this command, so it cannot be written; give another name"};
   }
-  std::error_code code;
-  if (fs::is_directory(path, code)) {
+  if (is_folder(path)) {
     return Error{path + ": is a folder, expected a file; give another name"};
   }
   if (is_store(path)) {
     return Error{path + ": is a store of simulations, so it cannot be written; give another name"};
   }
-  if (!replace && fs::exists(fs::symlink_status(path, code))) {
+  if (std::error_code ignored; !replace && fs::exists(fs::symlink_status(path, ignored))) {
     return Error{path + ": exists already; give another name, or --force to replace it"};
   }
   return check_writable(path);
@@ -182,9 +178,8 @@ Status Outputs::plan(const std::vector<std::string>& paths) {
   return {};
 }
 
-Status Outputs::plan_in(const std::string& folder, const std::vector<std::string>& names,
-                        FolderKind kind) {
-  RETURN_IF_ERROR(check_folder(folder, kind));
+Status Outputs::plan_in(const std::string& folder, const std::vector<std::string>& names) {
+  RETURN_IF_ERROR(check_folder(folder, FolderKind::kOther));
   for (const std::string& name : names) {
     RETURN_IF_ERROR(plan((fs::path(folder) / name).string()));
   }
@@ -239,12 +234,12 @@ Result<std::unique_ptr<Farm>> LongOptions::begin_in(const std::string& command,
   return start_recorded(farm, settings, context);
 }
 
-void TracedCommands::declare(CLI::App& app) {
+void TracedCommands::declare(CLI::App& app, TraceSettings* to) {
   app.add_option("--command", names, "Commands whose paths to look at; omitted: all");
   trials.declare(app, "Where commands are pieces: the pushes to trace, in place of the config's");
   app.add_option("--only", only,
                  "COLUMN=VALUE[,VALUE...]: leave all other pushes out; may repeat, all must hold");
-  app.add_option("--interval", interval_s, "Seconds between samples of a path")
+  app.add_option("--interval", to->interval_s, "Seconds between samples of a path")
       ->check(CLI::Range(0.001, 10.0))
       ->capture_default_str();
 }
@@ -253,7 +248,6 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   ASSIGN_OR_RETURN(Config config, read_config(path));
   RETURN_IF_ERROR(check_can(config.problem.scenario, kTraces, path));
   to->seed = config.seed;
-  to->interval_s = interval_s;
   RETURN_IF_ERROR(choose(config.problem.commands, to));
   if (config.problem.pieces.empty()) {
     if (trials.files.empty() && only.empty()) return config;

@@ -39,8 +39,7 @@ class Outputs {
   Status plan(const std::string& path);
   Status plan(const std::vector<std::string>& paths);
   // Files of these names in a folder that is made for them.  Error also: a folder of another kind.
-  Status plan_in(const std::string& folder, const std::vector<std::string>& names,
-                 FolderKind kind = FolderKind::kOther);
+  Status plan_in(const std::string& folder, const std::vector<std::string>& names);
   // A file of the command's own that it makes again, whoever made it before.
   Status plan_again(const std::string& path);
 
@@ -90,11 +89,10 @@ struct LongOptions {
 
 struct TracedCommands {
   std::vector<std::string> names;  // empty: all
-  double interval_s = 0.02;
-  TrialOptions trials;  // where commands are pieces
+  TrialOptions trials;             // where commands are pieces
   std::vector<std::string> only;
 
-  void declare(CLI::App& app);
+  void declare(CLI::App& app, TraceSettings* to);
   // The config, and in `to` what of it is traced: its commands, or the pushes of a log where the
   // commands are pieces.  Errors: of reading either, a name that is no command, nothing to trace.
   Result<Config> open(const std::string& path, TraceSettings* to) const;

@@ -55,11 +55,9 @@ Genome genome_of(const Problem& problem, unsigned k) {
 // The config's own values by one worker, and the seconds that other ones take once it knows the
 // problem: the median of a few.
 Status measure_evaluation(const Config& config, CliContext& context, Summary* summary) {
-  FarmOptions options;
-  options.workers = 1;
   SocketFarmOptions quiet;  // the answer says what went wrong
   quiet.on_event = [](const FarmEvent&) {};
-  ASSIGN_OR_RETURN(auto farm, start_farm(options, {}, context, std::move(quiet)));
+  ASSIGN_OR_RETURN(auto farm, start_farm({.workers = 1}, {}, context, std::move(quiet)));
   const std::string hash = farm->add_problem(to_proto(config.problem));
   // The first one brings the problem to the worker and starts a user's program, which takes seconds
   // at most: nothing beside a long one.
@@ -107,9 +105,8 @@ Status find_idle_genes(const Config& config, unsigned workers, CliContext& conte
                          format_duration(all_s) + " of evaluations");
     return {};
   }
-  FarmOptions options;
-  options.workers = static_cast<int>(std::max(1u, workers));  // remote ones do not check
-  ASSIGN_OR_RETURN(auto farm, start_farm(options, {}, context));
+  const int local = static_cast<int>(std::max(1u, workers));  // remote ones do not check
+  ASSIGN_OR_RETURN(auto farm, start_farm({.workers = local}, {}, context));
   ASSIGN_OR_RETURN(summary->idle, idle_genes(*farm, config));
   return {};
 }
@@ -128,13 +125,6 @@ std::vector<std::size_t> enabled_effects(const Problem& problem) {
   return enabled;
 }
 
-std::size_t piece_of(const Problem& problem, const Trial& trial) {
-  const auto& pieces = problem.pieces;
-  return static_cast<std::size_t>(
-      std::ranges::find_if(pieces, [&](const auto& piece) { return piece.name == trial.command; }) -
-      pieces.begin());
-}
-
 // Trials that differ in nothing that the enabled effects look at share one condition.
 std::size_t count_conditions(const Problem& problem, unsigned context) {
   if (problem.windows()) return problem.runs.size();
@@ -146,8 +136,8 @@ std::size_t count_conditions(const Problem& problem, unsigned context) {
     std::vector<double> key = {driven[i].left, driven[i].right, driven[i].duration_s};
     // A push is nothing but where the piece lay and how the finger went.
     if (!trial.tip.empty()) {
-      key.insert(key.end(),
-                 {double(piece_of(problem, trial)), trial.X_WS.x, trial.X_WS.y, trial.X_WS.theta});
+      const auto piece = &problem.piece(trial.command) - problem.pieces.data();
+      key.insert(key.end(), {double(piece), trial.X_WS.x, trial.X_WS.y, trial.X_WS.theta});
       for (const TipSample& tip : trial.tip) key.insert(key.end(), {tip.t_s, tip.x, tip.y});
     }
     if (context & kStartHeading) key.push_back(trial.X_WS.theta);

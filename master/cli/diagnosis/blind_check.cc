@@ -22,19 +22,16 @@ namespace gapfarm {
 namespace {
 
 struct BlindCheckOptions {
-  std::string config;
-  std::string out;
-  std::string foreign, truth, like, model, key;
-  DesignSettings design;
+  BlindCheckSettings check;
+  std::string foreign, truth, like;
   std::vector<std::string> sizes = {"clear", "subtle"};
   std::optional<unsigned> trials, workers, jobs;
   std::optional<std::uint64_t> seed;
-  double time_limit_s = 1800;
-  bool resume = false, strengths = false;
+  bool strengths = false;
 };
 
 Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
-  DesignSettings design = options.design;
+  DesignSettings design = options.check.design;
   RETURN_IF_ERROR(effects_named(config.problem.table(), design.effects));
   for (const std::string& word : options.sizes) {
     ASSIGN_OR_RETURN(const SizeLevel level, size_level(word));
@@ -45,9 +42,10 @@ Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config&
 }
 
 Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan, Console& console) {
-  Result<Config> config = read_config(options.config);
+  const std::string& path = options.check.diagnose.config_path;
+  Result<Config> config = read_config(path);
   if (!config) return config;
-  RETURN_IF_ERROR(check_can(config->problem.scenario, kSimulates, options.config));
+  RETURN_IF_ERROR(check_can(config->problem.scenario, kSimulates, path));
   if (options.seed) config->seed = *options.seed;
   SimulateSettings& simulate = config->simulate;
   if (options.trials) {
@@ -65,19 +63,17 @@ Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan, C
 
 DiagnoseSettings diagnose_of(const BlindCheckOptions& options) {
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
-  DiagnoseSettings diagnose;
+  DiagnoseSettings diagnose = options.check.diagnose;
   diagnose.command = {executable_path(), "diagnose"};
-  diagnose.config_path = options.config;
-  diagnose.model_path = options.model;
   diagnose.jobs = options.jobs.value_or(std::max(1u, cores / 2));
   diagnose.workers = options.workers.value_or(std::max(1u, cores / diagnose.jobs));
-  diagnose.time_limit_s = options.time_limit_s;
   return diagnose;
 }
 
-// Diagnoses take by far the most.
-std::vector<ProgressStage> blind_check_stages() {
-  return {{"find strengths", 4}, {"drive the cases", 1}, {"diagnose", 94}, {"judge", 1}};
+// Cases are made and scored while no diagnosis runs: with all the workers together.
+FarmOptions all_workers(const BlindCheckOptions& options) {
+  const DiagnoseSettings diagnose = diagnose_of(options);
+  return {.workers = static_cast<int>(diagnose.workers * diagnose.jobs)};
 }
 
 // What is being done, in the words of the check, as a stage of the whole.
@@ -89,11 +85,7 @@ std::size_t stage_of(const std::string& what, std::size_t now) {
 
 Result<std::unique_ptr<Farm>> start(const BlindCheckOptions& options, const Config& config,
                                     CliContext& context) {
-  // Cases are made and scored while no diagnosis runs: with all the workers together.
-  FarmOptions farm;
-  const DiagnoseSettings diagnose = diagnose_of(options);
-  farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
-  ASSIGN_OR_RETURN(auto started, start_farm(farm, config.farm, context));
+  ASSIGN_OR_RETURN(auto started, start_farm(all_workers(options), config.farm, context));
   if (!context.work->begun()) context.work->stage(0);
   return context.work->over(std::move(started));
 }
@@ -128,50 +120,51 @@ Result<int> show_strengths(const BlindCheckOptions& options, const Config& confi
   const BlindCheckHooks hooks = hooks_of(options, config, context);
   ASSIGN_OR_RETURN(const auto drawn, draw_design(planned, design, *farm, hooks.progress));
   const std::size_t trials = planned.log.trials.size();
+  const DesignSettings& asked = options.check.design;
   const std::string table = format_design(drawn, planned.table());
   context.console.result(std::to_string(trials) +
                              " trials a case.  A case of every effect and size, with the strength "
                              "that this experiment takes:\n\n" +
-                             table + "\nBeside these " + std::to_string(options.design.nulls) +
-                             " nulls, " + std::to_string(options.design.pairs) + " pairs and " +
-                             std::to_string(options.design.excluded) +
+                             table + "\nBeside these " + std::to_string(asked.nulls) + " nulls, " +
+                             std::to_string(asked.pairs) + " pairs and " +
+                             std::to_string(asked.excluded) +
                              " effects excluded from the catalogue.\n",
                          {{"trials", trials},
                           {"design", table},
-                          {"nulls", options.design.nulls},
-                          {"pairs", options.design.pairs},
-                          {"left_out", options.design.excluded}});
+                          {"nulls", asked.nulls},
+                          {"pairs", asked.pairs},
+                          {"left_out", asked.excluded}});
   return kExitDone;
 }
 
 Result<int> print_check(const BlindCheckOptions& options, const Config& config,
                         CliContext& context) {
-  FarmOptions farm;
-  const DiagnoseSettings diagnose = diagnose_of(options);
-  farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
-  const std::string cases =
-      options.foreign.empty() ? "cases of effects, " + std::to_string(options.design.nulls) +
-                                    " nulls and " + std::to_string(options.design.pairs) + " pairs"
-                              : "the cases of " + options.foreign;
-  return print_dry_run(
-      "diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
-      {{"out", options.out}, {"nulls", options.design.nulls}, {"pairs", options.design.pairs}},
-      farm, config.farm, context);
+  const std::string& out = options.check.out;
+  const unsigned nulls = options.check.design.nulls, pairs = options.check.design.pairs;
+  const std::string cases = options.foreign.empty()
+                                ? "cases of effects, " + std::to_string(nulls) + " nulls and " +
+                                      std::to_string(pairs) + " pairs"
+                                : "the cases of " + options.foreign;
+  return print_dry_run("diagnose " + cases + (out.empty() ? "" : " into " + out),
+                       {{"out", out}, {"nulls", nulls}, {"pairs", pairs}}, all_workers(options),
+                       config.farm, context);
 }
 
 // All that makes the cases and what is asked of them; not how many workers do it.
 std::string asked(const BlindCheckOptions& options, const std::string& config_text) {
   std::string text = config_text;
   const auto add = [&](const std::string& word) { text += '\0' + word; };
-  for (const std::string& word : {options.foreign, options.truth, options.like, options.model}) {
+  const DesignSettings& design = options.check.design;
+  for (const std::string& word :
+       {options.foreign, options.truth, options.like, options.check.diagnose.model_path}) {
     add(word);
   }
-  for (const auto* lists : {&options.design.effects, &options.sizes}) {
+  for (const auto* lists : {&design.effects, &options.sizes}) {
     for (const std::string& word : *lists) add(word);
     add("");
   }
-  for (const unsigned n : {options.design.nulls, options.design.pairs, options.design.excluded,
-                           options.design.per_effect, options.trials.value_or(0)}) {
+  for (const unsigned n : {design.nulls, design.pairs, design.excluded, design.per_effect,
+                           options.trials.value_or(0)}) {
     add(std::to_string(n));
   }
   add(options.seed ? std::to_string(*options.seed) : "");
@@ -179,29 +172,29 @@ std::string asked(const BlindCheckOptions& options, const std::string& config_te
 }
 
 Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
-  BlindCheckSettings settings;
+  BlindCheckSettings settings = options.check;
   ASSIGN_OR_RETURN(const Config config, config_of(options, settings.plan, context.console));
   ASSIGN_OR_RETURN(const auto design, design_of(options, config));
   if (context.dry_run) return print_check(options, config, context);
   if (options.strengths && options.foreign.empty()) {
     return show_strengths(options, config, settings.plan, design, context);
   }
-  if (options.out.empty()) {
+  if (settings.out.empty()) {
     return Error{"--out DIR is missing: the folder for cases, seals and result"};
   }
-  RETURN_IF_ERROR(check_folder(options.out, FolderKind::kBlindCheck));
+  RETURN_IF_ERROR(check_folder(settings.out, FolderKind::kBlindCheck));
   settings.design = design;
   settings.diagnose = diagnose_of(options);
-  settings.out = options.out;
-  settings.key_path = options.key;
-  settings.resume = options.resume;
   settings.provenance = {
       {"command", command_line()},
       {"program", "gapfarm " + build_info().version + ", build " + build_info().fingerprint},
       {"seed", std::to_string(config.seed)}};
   settings.asked = asked(options, config.text);
-  const KeepingPlace place{options.out, /*passing=*/false, /*forget=*/true};
-  RETURN_IF_ERROR(LongCommand::begin("blind-check", place, blind_check_stages(), context));
+  const KeepingPlace place{settings.out, /*passing=*/false, /*forget=*/true};
+  // Diagnoses take by far the most.
+  RETURN_IF_ERROR(LongCommand::begin(
+      "blind-check", place,
+      {{"find strengths", 4}, {"drive the cases", 1}, {"diagnose", 94}, {"judge", 1}}, context));
   const BlindCheckHooks hooks = hooks_of(options, config, context);
   ASSIGN_OR_RETURN(const BlindReport report,
                    options.foreign.empty()
@@ -209,20 +202,20 @@ Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
                        : run_foreign_check(options.foreign, options.truth, settings, hooks));
   context.console.print(context.console.json() ? format_blind_json(report)
                                                : format_blind_summary(report));
-  context.console.note("tables: " + options.out + "/blind_check.md");
+  context.console.note("tables: " + settings.out + "/blind_check.md");
   return kExitDone;
 }
 
 void declare_cases(CLI::App& app, BlindCheckOptions& options) {
-  app.add_option("--effects", options.design.effects, "Only these effects of the catalogue");
+  app.add_option("--effects", options.check.design.effects, "Only these effects of the catalogue");
   app.add_option("--sizes", options.sizes,
                  "clear (5), subtle (1.6) or numbers: mean squared shift of the end poses in units "
                  "of their spread; 1 is nothing")
       ->delimiter(',');
-  app.add_option("--per-effect", options.design.per_effect, "Cases an effect and size");
-  app.add_option("--nulls", options.design.nulls, "Cases without any effect");
-  app.add_option("--pairs", options.design.pairs, "Cases with two effects");
-  app.add_option("--left-out", options.design.excluded,
+  app.add_option("--per-effect", options.check.design.per_effect, "Cases an effect and size");
+  app.add_option("--nulls", options.check.design.nulls, "Cases without any effect");
+  app.add_option("--pairs", options.check.design.pairs, "Cases with two effects");
+  app.add_option("--left-out", options.check.design.excluded,
                  "Cases whose effect, and what passes for it, the diagnosis has to do without");
   app.add_option("--trials", options.trials, "Trials a case (default: as [simulate] says)")
       ->check(CLI::Range(1, 1000000));
@@ -235,21 +228,23 @@ void declare_cases(CLI::App& app, BlindCheckOptions& options) {
 
 SubcommandRun setup_blind_check(CLI::App& app) {
   auto options = std::make_shared<BlindCheckOptions>();
-  app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
-  app.add_option("--out", options->out, "Folder for cases, seals, diagnoses and result");
+  BlindCheckSettings& check = options->check;
+  app.add_option("CONFIG", check.diagnose.config_path, "Config file (TOML)")->required();
+  app.add_option("--out", check.out, "Folder for cases, seals, diagnoses and result");
   declare_cases(app, *options);
-  app.add_option("--model", options->model, "Base model for every diagnosis");
+  app.add_option("--model", check.diagnose.model_path, "Base model for every diagnosis");
   app.add_option("--seed", options->seed, "Of robots, effects, plans and noise");
   app.add_option("--workers", options->workers, "Worker processes of each diagnosis")
       ->check(CLI::Range(1, 4096));
   app.add_option("--jobs", options->jobs, "Diagnoses at a time (default: half the cores)")
       ->check(CLI::Range(1, 4096));
-  app.add_option("--time-limit", options->time_limit_s, "s; a slower diagnosis counts as failed")
+  app.add_option("--time-limit", check.diagnose.time_limit_s,
+                 "s; a slower diagnosis counts as failed")
       ->check(CLI::PositiveNumber);
-  app.add_option("--key", options->key,
+  app.add_option("--key", check.key_path,
                  "Keep the truths' key in this file, outside the folder, so that even a killed "
                  "check can be resumed (default: OUT.key, written when stopped)");
-  app.add_flag("--resume", options->resume,
+  app.add_flag("--resume", check.resume,
                "Go on with the check in the folder as it was asked, whatever is asked now, or "
                "judge a finished one again; the same command goes on by itself");
   app.add_flag("--strengths", options->strengths,

@@ -43,22 +43,17 @@ constexpr OptionOf kPlanOptions[] = {
     {"--want", kOfDrive},    {"--limit", kOfDrive},
 };
 
-struct PlannedPlace {
-  double length_m, width_m;
-};
-
 // "2", "2x2" or "4x3".
-Result<PlannedPlace> place_of(const std::string& text) {
-  const std::size_t x = text.find('x');
-  PlannedPlace place{};
+Status read_place(const std::string& text, plan::DriveSettings* place) {
   const auto read = [](std::string_view part, double* value) {
     *value = parse_double(part).value_or(0);
     return *value > 0 && *value <= 1000;
   };
-  const std::string_view first = std::string_view(text).substr(0, x);
-  const std::string_view second =
-      x == std::string::npos ? first : std::string_view(text).substr(x + 1);
-  if (read(first, &place.length_m) && read(second, &place.width_m)) return place;
+  const auto sides = parts_of(text, 'x');
+  if (sides.size() <= 2 && read(sides.front(), &place->length_m) &&
+      read(sides.back(), &place->width_m)) {
+    return {};
+  }
   return Error{"--place is '" + text +
                "', expected the size of a floor in metres, such as 2, 2x2 or 4x3"};
 }
@@ -66,7 +61,8 @@ Result<PlannedPlace> place_of(const std::string& text) {
 Status apply_options(PlanOptions& options, Config& config) {
   SimulateSettings& s = config.simulate;
   if (!options.place.empty()) {
-    ASSIGN_OR_RETURN(const PlannedPlace place, place_of(options.place));
+    plan::DriveSettings place;
+    RETURN_IF_ERROR(read_place(options.place, &place));
     if (place.length_m != place.width_m) {
       return Error{"--place is '" + options.place + "', expected a square, such as 2x2"};
     }
@@ -163,14 +159,11 @@ Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& cont
   options.outputs.reads(options.source);
   options.outputs.reads(source.config);
   if (of_drive) {
-    DriveTask task{options.source, options.out, options.picture};
-    task.seed = options.settings.seed;
-    if (!options.place.empty()) {
-      ASSIGN_OR_RETURN(const PlannedPlace place, place_of(options.place));
-      task.length_m = place.length_m;
-      task.width_m = place.width_m;
-    }
-    return run_plan_drive(options.drive, task, source.config, options.outputs, context);
+    plan::DriveSettings& drive = options.drive.settings;
+    drive.seed = options.settings.seed;
+    if (!options.place.empty()) RETURN_IF_ERROR(read_place(options.place, &drive));
+    return run_plan_drive(options.drive, {options.source, options.out, options.picture},
+                          source.config, options.outputs, context);
   }
   RETURN_IF_ERROR(check_can(source.config.problem.scenario, kSimulates, options.source));
   RETURN_IF_ERROR(apply_options(options, source.config));

@@ -15,7 +15,6 @@
 #include "common/problem/problem.h"
 #include "common/trials/text/csv.h"
 #include "master/command/inputs.h"
-#include "master/experiments/plan/drive_knowledge.h"
 #include "master/io/logs/column_map.h"
 #include "master/report/figures/figures.h"
 
@@ -29,12 +28,9 @@ constexpr double kUsual = 0.02;  // of a recorded channel's rows lie beyond its 
 constexpr double kRecordedEvery_s = 1;
 constexpr double kMarks_s[] = {5, 10, 20, 30, 60, 120, 300, 600};
 
-std::optional<double> number_of(std::string text) {
-  double scale = 1;
-  if (!text.empty() && text.back() == '%') {
-    scale = 0.01;
-    text.pop_back();
-  }
+std::optional<double> number_of(std::string_view text) {
+  const double scale = text.ends_with('%') ? 0.01 : 1;
+  if (text.ends_with('%')) text.remove_suffix(1);
   const auto value = parse_double(text);
   return value && std::isfinite(*value) ? std::optional(scale * *value) : std::nullopt;
 }
@@ -43,14 +39,14 @@ Result<std::vector<plan::Wanted>> wanted_of(const std::vector<std::string>& text
                                             const std::vector<KinematicRow>& rows) {
   std::vector<plan::Wanted> all;
   for (const std::string& text : texts) {
-    const std::size_t equal = text.find('=');
-    plan::Wanted wanted{text.substr(0, equal), 0};
+    const auto [name, width_text] = cut_at(text, '=');
+    plan::Wanted wanted{name, 0};
     if (!contains(rows, wanted.name, &KinematicRow::name)) {
       return Error{"this robot has no value \"" + wanted.name + "\", expected one of " +
                    joined(rows, ", ", &KinematicRow::name)};
     }
-    if (equal != std::string::npos) {
-      const auto width = number_of(text.substr(equal + 1));
+    if (width_text) {
+      const auto width = number_of(*width_text);
       if (!width || *width <= 0) {
         return Error{"--want is '" + text +
                      "', expected a value's name and how wide its 90 % interval may be, such as "
@@ -60,7 +56,7 @@ Result<std::vector<plan::Wanted>> wanted_of(const std::vector<std::string>& text
         return Error{"--want is '" + text + "', a width of " + fmt::format("{:g}", 100 * *width) +
                      " %, or of a metre, a second or a radian and more, which nobody has to drive "
                      "for; for a hundredth write " +
-                     text.substr(0, equal) + "=1%"};
+                     name + "=1%"};
       }
       wanted.width = *width;
     }
@@ -93,21 +89,16 @@ Result<std::vector<Interval>> limits_of(const std::vector<std::string>& texts,
                                         const RunLog& recorded) {
   std::map<std::string, Interval> limits = recorded_limits(channels, recorded);
   for (const std::string& text : texts) {
-    const std::size_t equal = text.find('='), comma = text.find(',');
-    const std::string name = text.substr(0, equal);
-    const auto last = equal == std::string::npos
-                          ? std::nullopt
-                          : number_of(text.substr(
-                                std::max(equal, comma == std::string::npos ? equal : comma) + 1));
-    const auto first = comma == std::string::npos
-                           ? (last ? std::optional(-*last) : last)
-                           : number_of(text.substr(equal + 1, comma - equal - 1));
-    if (!first || !last || *first >= *last || !contains(channels, name)) {
+    const auto [name, range] = cut_at(text, '=');
+    auto ends = mapped(parts_of(range.value_or(""), ','), number_of);
+    if (ends.size() == 1 && ends[0]) ends.insert(ends.begin(), -*ends[0]);
+    if (ends.size() != 2 || !ends[0] || !ends[1] || *ends[0] >= *ends[1] ||
+        !contains(channels, name)) {
       return Error{"--limit is '" + text + "', expected CHANNEL=MOST or CHANNEL=LEAST,MOST with " +
                    "one of the robot's channels " + joined(channels) + ", such as " +
                    channels.front() + "=0.5"};
     }
-    limits[name] = {*first, *last};
+    limits[name] = {*ends[0], *ends[1]};
   }
   std::vector<Interval> all;
   for (const std::string& channel : channels) {
@@ -226,8 +217,8 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
   return {text, json};
 }
 
-std::string drive_picture(const DrivePlan& drive, const DriveTask& task) {
-  const double x = task.length_m / 2, y = task.width_m / 2;
+std::string drive_picture(const DrivePlan& drive, const plan::DriveSettings& settings) {
+  const double x = settings.length_m / 2, y = settings.width_m / 2;
   const auto place = [](const Pose& X) { return SvgPoint{X.x, X.y}; };
   ChartSeries floor{"the floor", {{-x, -y}, {x, -y}, {x, y}, {-x, y}, {-x, -y}}};
   ChartSeries headings{.name = "heading as a move ends", .arrows = true};
@@ -241,7 +232,7 @@ std::string drive_picture(const DrivePlan& drive, const DriveTask& task) {
     chart.series.push_back({"run " + run.run, mapped(X_WM, place)});
     for (const Pose& X : X_WM) {
       headings.line.insert(headings.line.end(),
-                           {place(X), place(X * Pose{0.03 * task.length_m, 0, 0})});
+                           {place(X), place(X * Pose{0.03 * settings.length_m, 0, 0})});
     }
   }
   chart.series.insert(chart.series.end(), {headings, floor});
@@ -251,7 +242,7 @@ std::string drive_picture(const DrivePlan& drive, const DriveTask& task) {
 }  // namespace
 
 void DriveOptions::declare(CLI::App& app) {
-  app.add_option("--seconds", seconds, "Of a ground robot's drive, at most")
+  app.add_option("--seconds", settings.seconds, "Of a ground robot's drive, at most")
       ->check(CLI::Range(2.0, 3600.0))
       ->capture_default_str();
   app.add_option("--want", wanted,
@@ -272,23 +263,19 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
     outputs.reads_runs(config.trial_files);
     ASSIGN_OR_RETURN(recorded, read_run_folders(config.trial_files, robot.channels));
   }
-  plan::DriveSettings settings;
-  settings.seconds = options.seconds;
-  settings.length_m = task.length_m;
-  settings.width_m = task.width_m;
-  settings.seed = task.seed;
+  plan::DriveSettings settings = options.settings;
   ASSIGN_OR_RETURN(settings.wanted, wanted_of(options.wanted, kinematic_rows(robot)));
   ASSIGN_OR_RETURN(settings.limits, limits_of(options.limits, robot.channels, recorded));
   RETURN_IF_ERROR(outputs.plan_in(task.out, {"commands.csv", "waypoints.csv"}));
   RETURN_IF_ERROR(outputs.plan({task.picture}));
   if (context.dry_run) {
-    return print_dry_run(fmt::format("plan a drive of {:.0f} s for {} into {}", options.seconds,
+    return print_dry_run(fmt::format("plan a drive of {:.0f} s for {} into {}", settings.seconds,
                                      task.source, task.out),
-                         {{"out", task.out}, {"seconds", options.seconds}}, {}, config.farm,
+                         {{"out", task.out}, {"seconds", settings.seconds}}, {}, config.farm,
                          context);
   }
   context.begun = true;
-  context.console.progress(fmt::format("planning {:.0f} s of driving", options.seconds));
+  context.console.progress(fmt::format("planning {:.0f} s of driving", settings.seconds));
   ASSIGN_OR_RETURN(DrivePlan drive, plan::plan_drive(robot, noise, settings));
   std::vector<NamedWidths> others;
   settings.random = true;
@@ -302,7 +289,7 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
   RETURN_IF_ERROR(outputs.write_in(
       task.out, {{"commands.csv", files.commands}, {"waypoints.csv", files.poses}}));
   if (!task.picture.empty()) {
-    RETURN_IF_ERROR(outputs.write(task.picture, drive_picture(drive, task)));
+    RETURN_IF_ERROR(outputs.write(task.picture, drive_picture(drive, settings)));
   }
   const auto [text, json] = result_of(drive, others, noise, settings.wanted, task);
   context.console.result(text, json);

@@ -2,18 +2,18 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "common/config/settings.h"
 #include "master/command/console.h"
 #include "master/command/outputs.h"
+#include "master/experiments/plan/drive_knowledge.h"
 
 namespace gapfarm {
 
 struct DriveOptions {
-  double seconds = 60;
+  plan::DriveSettings settings;
   std::vector<std::string> wanted;  // NAME or NAME=WIDTH
   std::vector<std::string> limits;  // CHANNEL=MOST or CHANNEL=LEAST,MOST
 
@@ -24,8 +24,6 @@ struct DriveTask {
   std::string source;  // of the config
   std::string out;     // folder
   std::string picture;
-  double length_m = 4, width_m = 4;
-  std::uint64_t seed = 1;
 };
 
 // Writes commands.csv and waypoints.csv.  REQUIRES: `config` has a ground robot, `outputs` knows

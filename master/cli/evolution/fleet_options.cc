@@ -47,7 +47,7 @@ std::vector<std::string> worker_command(const FleetChoice& choice, const Cluster
   }
   if (choice.allow_external || site.allow_external) command.push_back("--allow-external");
   const auto seconds = [](double s) { return std::to_string(std::lround(s)); };
-  command.insert(command.end(), {"--processes", std::to_string(choice.workers_per_job),
+  command.insert(command.end(), {"--processes", std::to_string(choice.limits.workers_per_job),
                                  "--wait-limit", seconds(wait_limit_s)});
   if (wall_s > 0) {
     const double margin = std::min(kMostMargin_s, wall_s / 4);
@@ -70,15 +70,16 @@ void FleetChoice::declare(CLI::App& app, const std::string& with) {
   if (alone) on->required();
   if (!alone) app.option_defaults()->group("");
   const std::size_t others = static_cast<const CLI::App&>(app).get_options().size();
-  app.add_option("--min", min_workers, "Workers to keep also when there is little to do");
-  app.add_option("--max", max_workers, "Workers at most")->check(CLI::Range(1, 1000000));
+  app.add_option("--min", limits.min_workers, "Workers to keep also when there is little to do");
+  app.add_option("--max", limits.max_workers, "Workers at most")->check(CLI::Range(1, 1000000));
   app.add_option("--site", site, "A site's own file in place of configs/sites/SYSTEM.toml")
       ->type_name("FILE");
-  app.add_option("--workers-per-job", workers_per_job, "Worker processes, and cores, of a job")
+  app.add_option("--workers-per-job", limits.workers_per_job,
+                 "Worker processes, and cores, of a job")
       ->check(CLI::Range(1, 4096));
   app.add_option("--wall-time", wall_time, "Of each job: seconds, H:MM:SS or D-HH:MM:SS")
       ->type_name("TIME");
-  app.add_option("--idle", idle_s, "Workers that are not needed for so many seconds go")
+  app.add_option("--idle", limits.idle_s, "Workers that are not needed for so many seconds go")
       ->check(CLI::PositiveNumber);
   app.add_option("--look-every", look_interval_s, "Seconds between two looks at the cluster")
       ->check(CLI::PositiveNumber);
@@ -135,9 +136,10 @@ Result<ClusterSite> FleetChoice::read_site() const {
 }
 
 Status FleetChoice::check() const {
-  if (max_workers < std::max(min_workers, workers_per_job)) {
-    return Error{"--max " + std::to_string(max_workers) + " is less than --min or than the " +
-                 std::to_string(workers_per_job) + " workers of one job; give --max N"};
+  if (limits.max_workers < std::max(limits.min_workers, limits.workers_per_job)) {
+    return Error{"--max " + std::to_string(limits.max_workers) +
+                 " is less than --min or than the " + std::to_string(limits.workers_per_job) +
+                 " workers of one job; give --max N"};
   }
   if (!wall_time.empty()) {
     ASSIGN_OR_RETURN([[maybe_unused]] const double seconds, wall_time_s(wall_time));
@@ -187,16 +189,20 @@ Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& 
   fleet.name = fleet_name(endpoint, site.system);
   fleet.worker = worker_command(choice, site, program, endpoint, keys, insecure, fleet.wall_time_s,
                                 options.wait_limit_s);
-  fleet.limits.min_workers = choice.min_workers;
-  fleet.limits.max_workers = choice.max_workers;
-  fleet.limits.workers_per_job = choice.workers_per_job;
-  fleet.limits.idle_s = choice.idle_s;
+  fleet.limits = choice.limits;
   fleet.limits.backoff_s = site.backoff_s;
   fleet.logs = whole_path(choice.logs);
   fleet.extra = choice.extra;
   if (!choice.ssh_config.empty()) fleet.ssh = {"-F", choice.ssh_config};
   fleet.site = std::move(site);
   return options;
+}
+
+Status make_log_folder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return Error{"cannot make '" + folder + "' for logs: " + error.message()};
+  return {};
 }
 
 Result<std::unique_ptr<OwnedChild>> start_workers_beside(const FleetChoice& choice,

@@ -15,10 +15,8 @@ namespace gapfarm {
 struct FleetChoice {
   std::string system;  // of configs/sites/SYSTEM.toml
   std::string site;    // a file in its place
-  unsigned min_workers = 0, max_workers = 0;
-  unsigned workers_per_job = 1;
+  FleetLimits limits = {.max_workers = 0};
   std::string wall_time;
-  double idle_s = FleetLimits().idle_s;
   double look_interval_s = 0;  // 0: the site's
   std::vector<std::string> hosts;
   std::string ssh_config;
@@ -46,6 +44,9 @@ Result<double> wall_time_s(const std::string& text);
 
 Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& endpoint,
                                   const std::string& keys, bool insecure);
+
+// Of jobs.
+Status make_log_folder(const std::string& folder);
 
 // `gapfarm workers` as a child, while it lives; then its workers are taken away.
 Result<std::unique_ptr<OwnedChild>> start_workers_beside(const FleetChoice& choice,

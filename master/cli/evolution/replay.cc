@@ -179,9 +179,7 @@ Result<int> run_replay(ReplayOptions& options, CliContext& context) {
   RETURN_IF_ERROR(options.outputs.plan(options.paths));
   RETURN_IF_ERROR(options.outputs.plan(options.out));
 
-  FarmOptions local;
-  local.workers = 1;
-  ASSIGN_OR_RETURN(auto farm, start_farm(local, {}, context));
+  ASSIGN_OR_RETURN(auto farm, start_farm({.workers = 1}, {}, context));
   Replay replay(*farm, problem, info.seed);
   Result<Standing> again = replay.standing(found.individual, found.individual.birth_id);
   if (!again) return again.error();

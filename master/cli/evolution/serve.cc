@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -17,6 +16,7 @@
 #include "common/json/json.h"
 #include "common/problem/problem.h"
 #include "common/score/motion_model.h"
+#include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/page_along.h"
@@ -227,9 +227,7 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
                   best.individual.birth_id);
   if (const auto known = shown_.find(key); known != shown_.end()) return known->second;
   if (!farm_) {
-    FarmOptions local;
-    local.workers = 1;
-    ASSIGN_OR_RETURN(farm_, start_farm(local, {}, context_));
+    ASSIGN_OR_RETURN(farm_, start_farm({.workers = 1}, {}, context_));
   }
   const Problem& of = beyond ? **apart : problem;
   const Trial& trial = of.log.trials[beyond ? question.trial - logged : question.trial];
@@ -274,8 +272,7 @@ double thread_cpu_now_s() {
 
 Result<int> run_serve(const ServeOptions& options, CliContext& context) {
   for (const std::string& folder : options.folders) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(folder, ignored)) continue;
+    if (is_folder(folder)) continue;
     return Error{folder + ": no such folder; name one with runs or diagnoses"};
   }
   // A master commits within milliseconds; who holds a store for longer is not waited for, since

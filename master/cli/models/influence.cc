@@ -102,7 +102,7 @@ SubcommandRun setup_influence(CLI::App& app) {
   app.add_option("--trajectories", to.trajectories, "Random walks of Morris's method")
       ->check(CLI::Range(4, 100000))
       ->capture_default_str();
-  command->traced.declare(app);
+  command->traced.declare(app, &to.trace);
   command->declare(app, LongOptions::Leaves::kFolder, true);
   app.footer(
       "Examples:\n"

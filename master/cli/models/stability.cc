@@ -109,7 +109,7 @@ SubcommandRun setup_stability(CLI::App& app) {
   app.add_option("--evaluations", command->settings.evaluations, "Points to try")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->traced.declare(app);
+  command->traced.declare(app, &command->settings.trace);
   command->declare(app, LongOptions::Leaves::kFolder, true);
   app.footer(
       "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "

@@ -1,11 +1,10 @@
 // gapfarm keys: who may work for this user's masters.
 #include "common/net/keys.h"
 
-#include <unistd.h>
-
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/build_info.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {
@@ -20,11 +19,7 @@ struct KeysOptions {
   bool worker_only = false;
 };
 
-std::string key_name_of_host() {
-  char name[65] = {};
-  if (gethostname(name, sizeof name - 1) != 0 || !is_key_name(name)) return "worker";
-  return name;
-}
+std::string key_name_of_host() { return is_key_name(host_name()) ? host_name() : "worker"; }
 
 Json key_json(const std::string& folder, const std::string& worker, const std::string& public_key) {
   return {{"folder", folder}, {"worker", worker}, {"public", public_key}};

@@ -1,6 +1,4 @@
 // gapfarm submit: a run's master as a job of the cluster, with its workers as jobs beside it.
-#include <unistd.h>
-
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -119,9 +117,7 @@ Result<int> run_submit(SubmitCommand command, CliContext& context) {
     return kExitDone;
   }
   context.begun = true;
-  std::error_code error;
-  std::filesystem::create_directories(logs, error);
-  if (error) return Error{"cannot make '" + logs + "' for logs: " + error.message()};
+  RETURN_IF_ERROR(make_log_folder(logs));
   ChildSetup setup;
   setup.arguments = submit;
   ASSIGN_OR_RETURN(const Captured captured, run_captured(std::move(setup), script, kSubmitLimit_s));

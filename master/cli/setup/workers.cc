@@ -1,5 +1,4 @@
 // gapfarm workers: workers from the cluster that is there, as many as there is work for.
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -70,11 +69,7 @@ Result<int> run_workers(WorkersCommand command, CliContext& context) {
     return kExitDone;
   }
   context.begun = true;
-  if (fleet.site.hosts.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(fleet.logs, error);
-    if (error) return Error{"cannot make '" + fleet.logs + "' for logs: " + error.message()};
-  }
+  if (fleet.site.hosts.empty()) RETURN_IF_ERROR(make_log_folder(fleet.logs));
   const std::string who = fleet.site.system + ": ";
   context.console.note(who + "up to " + std::to_string(fleet.limits.max_workers) +
                        " workers for the master at " + endpoint + ", as jobs named " + fleet.name);
