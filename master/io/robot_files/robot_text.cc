@@ -73,11 +73,6 @@ std::string number(const std::optional<double>& value, const char* format = "%.4
   return value ? number(*value, format) : "-";
 }
 
-std::string padded(std::string text, std::size_t width) {
-  if (text.size() < width) text.append(width - text.size(), ' ');
-  return text;
-}
-
 std::string role(const RobotWheel& wheel) {
   if (wheel.kind == WheelKind::kCaster) return "caster";
   std::string description = wheel.driven ? "driven" : "free";
@@ -131,7 +126,8 @@ std::string wheel_table(const RobotReading& reading, const GroundRobot& complete
   std::string text;
   for (const auto& row : rows) {
     text += "  ";
-    for (std::size_t i = 0; i + 1 < row.size(); ++i) text += padded(row[i], widths[i] + 2);
+    for (std::size_t i = 0; i + 1 < row.size(); ++i)
+      text += row[i] + std::string(widths[i] + 2 - row[i].size(), ' ');
     text += row.back() + "\n";
   }
   return text;
