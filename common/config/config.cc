@@ -71,15 +71,12 @@ bool read_robot_section(TomlSection& top, const Problem* known, Config& config) 
   return true;
 }
 
-void read_runs_section(TomlSection& top, Config& config) {
-  auto runs = top.section("runs");
-  if (!runs) return;
-  for (const std::string& folder : runs->strings("folders").value_or(std::vector<std::string>())) {
+void read_windows(TomlSection& runs, Config& config) {
+  for (const std::string& folder : runs.strings("folders").value_or(std::vector<std::string>())) {
     config.trial_files.push_back(beside(config.path, folder));
   }
-  if (auto horizons = runs->numbers("horizons", 0, 1e5, "s")) config.windows.horizons_s = *horizons;
-  runs->read("run_in", config.windows.run_in_s, 0, 1e3, "s");
-  runs->finish();
+  if (auto horizons = runs.numbers("horizons", 0, 1e5, "s")) config.windows.horizons_s = *horizons;
+  runs.read("run_in", config.windows.run_in_s, 0, 1e3, "s");
 }
 
 // What only scenarios have in which something moves.
@@ -88,9 +85,9 @@ void read_motions(TomlSection& top, const ScenarioForm& form, Config& config) {
   read_effects(top, problem.table(), problem.values);
   read_pieces(top, form, problem.pieces, problem.commands);
   if (!form.pieces) read_commands(top, problem.commands);
-  top.within("fitness", [&](TomlSection& section) { read_fitness(section, problem.fitness); });
+  top.within("fitness", read_fitness, problem.fitness);
   read_spread(top, problem.spread);
-  read_simulate(top, problem.commands, config.simulate);
+  top.within("simulate", read_simulate, problem.commands, config.simulate);
   top.find("validation");  // as [[stages]]
 }
 
@@ -124,21 +121,21 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   const ScenarioForm& form = scenario_form(problem.scenario);
   if ((form.robot || form.other_robot) && !read_robot_section(top, known, config))
     return errors.error();
-  if (form.windows) read_runs_section(top, config);
+  if (form.windows) top.within("runs", read_windows, config);
   if (form.program && !read_external_section(top, config.path, start, known, problem)) {
     return errors.error();
   }
   const ParameterTable& table = problem.table();
   problem.values = problem.tracked ? problem.tracked->values() : table.nominal();
   problem.commands = default_commands(problem.scenario);
-  read_parameters(top, table, problem.values);
+  top.within("parameters", read_parameters, table, problem.values);
   read_genes(top, table, problem.genes);
   if (form.objective) {
     if (problem.genes.empty()) search_everything(table, problem.genes);
   } else {
     read_motions(top, form, config);
   }
-  read_evolution(top, config.evolution);
+  top.within("evolution", read_evolution, config.evolution);
   read_optimiser(top, config.evolution.optimiser);
   const bool front = config.evolution.optimiser.kind == OptimiserKind::kNsga2;
   if (front == problem.fitness.objectives.empty()) {
@@ -148,7 +145,7 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
                      : "several objectives need [optimiser] kind = \"nsga2\"; the other kinds "
                        "search one fitness");
   }
-  read_farm(top, config.farm);
+  top.within("farm", read_farm, config.farm);
   top.find("stages");  // read by those who look at them: read_stages()
   top.finish();
   if (!errors.empty()) return errors.error();
@@ -223,13 +220,12 @@ Result<Comparison> read_comparison(const std::string& path) {
   TomlSection top(parsed, "", errors);
   Comparison comparison;
   std::string config;
-  if (auto section = top.section("compare")) {
-    section->read("config", config);
-    section->read("seeds", comparison.seeds, 1, 10000);
-    section->read("evaluations", comparison.evaluations, 1);
-    section->read("target_fitness", comparison.target_fitness, -kUnbounded, kUnbounded);
-    section->finish();
-  }
+  top.within("compare", [&](TomlSection& section) {
+    section.read("config", config);
+    section.read("seeds", comparison.seeds, 1, 10000);
+    section.read("evaluations", comparison.evaluations, 1);
+    section.read("target_fitness", comparison.target_fitness, -kUnbounded, kUnbounded);
+  });
   const auto variants = top.section("variants");
   top.finish();
   if (!errors.empty()) return errors.error();
@@ -276,8 +272,7 @@ class StageReader {
     const auto genes = section.choices("genes", names_);
     if (genes) {
       stage.genes = *genes;
-      std::sort(stage.genes.begin(), stage.genes.end());
-      stage.genes.erase(std::unique(stage.genes.begin(), stage.genes.end()), stage.genes.end());
+      std::ranges::sort(stage.genes);
     }
     section.read("evaluations", stage.evaluations, 1);
     section.finish();
@@ -313,14 +308,12 @@ Result<StagePlan> read_stages(const Config& config) {
                  "front; leave [[stages]] out");
     }
   }
-  if (auto validation = top.section("validation")) {
-    if (const auto files = validation->strings(config.problem.windows() ? "folders" : "trials")) {
-      for (const std::string& file : *files) {
-        plan.validation_files.push_back(beside(config.path, file));
-      }
+  top.within("validation", [&](TomlSection& section) {
+    const auto files = section.strings(config.problem.windows() ? "folders" : "trials");
+    for (const std::string& file : files.value_or(std::vector<std::string>())) {
+      plan.validation_files.push_back(beside(config.path, file));
     }
-    validation->finish();
-  }
+  });
   if (!errors.empty()) return errors.error();
   return plan;
 }

@@ -8,49 +8,28 @@
 
 namespace gapfarm {
 
-namespace {
-
-std::string expected_value(const Parameter& row) {
-  if (row.kind == ParameterKind::kBoolean) return "true or false";
-  if (row.kind == ParameterKind::kInteger) return "an integer";
-  if (row.kind == ParameterKind::kReal) {
-    return row.unit == "-" ? "a number" : "a number in " + row.unit;
-  }
-  return one_of(row.choices);
-}
-
-}  // namespace
-
 std::optional<double> row_value(const toml::node& node, const ParameterTable& table,
                                 std::size_t row, TomlErrors& errors) {
   const Parameter& parameter = table[row];
   std::optional<double> value;
+  std::string expected = parameter.unit == "-" ? "a number" : "a number in " + parameter.unit;
   switch (parameter.kind) {
     case ParameterKind::kReal:
       if (node.is_number()) value = node.value<double>();
       break;
     case ParameterKind::kInteger:
+      expected = "an integer";
       if (node.is_integer()) value = static_cast<double>(node.as_integer()->get());
       break;
     case ParameterKind::kBoolean:
+      expected = "true or false";
       if (node.is_boolean()) value = node.as_boolean()->get() ? 1 : 0;
       break;
     case ParameterKind::kChoice:
-      if (const auto* word = node.as_string()) {
-        const auto& choices = parameter.choices;
-        const auto found = std::find(choices.begin(), choices.end(), word->get());
-        if (found == choices.end()) {
-          errors.add(node, "unknown " + parameter.key + " " + quoted_word(word->get()) +
-                               suggestion(word->get(), choices));
-          return {};
-        }
-        value = static_cast<double>(found - choices.begin());
-      }
-      break;
+      return errors.choice(parameter.key, node, parameter.choices);
   }
   if (!value) {
-    errors.add(node, parameter.key + " is " + toml_type_name(node) + ", expected " +
-                         expected_value(parameter));
+    errors.wrong_type(parameter.key, node, expected);
     return {};
   }
   const Status accepted = table.check(row, *value);
@@ -59,25 +38,22 @@ std::optional<double> row_value(const toml::node& node, const ParameterTable& ta
   return {};
 }
 
-void read_parameters(TomlSection& top, const ParameterTable& table, ParameterValues& values) {
-  auto section = top.section("parameters");
-  if (!section) return;
+void read_parameters(TomlSection& section, const ParameterTable& table, ParameterValues& values) {
   for (std::size_t row = 0; row < table.size(); ++row) {
     if (!table[row].effect.empty()) {
       // Known, so that it is not "unknown"; but it has its own place.
-      if (section->table().contains(table[row].key)) {
-        section->find(table[row].key);
-        section->fail(table[row].key, table[row].key +
-                                          " belongs to an effect; write it in [effects." +
-                                          table[row].effect + "]");
+      if (section.table().contains(table[row].key)) {
+        section.find(table[row].key);
+        section.fail(table[row].key, table[row].key +
+                                         " belongs to an effect; write it in [effects." +
+                                         table[row].effect + "]");
       }
       continue;
     }
-    const toml::node* node = section->find(table[row].key);
+    const toml::node* node = section.find(table[row].key);
     if (node == nullptr) continue;
-    values[row] = row_value(*node, table, row, section->errors()).value_or(values[row]);
+    values[row] = row_value(*node, table, row, section.errors()).value_or(values[row]);
   }
-  section->finish();
 }
 
 void for_effect_rows(TomlSection& top, const ParameterTable& table, const EffectRowReader& read) {
@@ -152,9 +128,8 @@ class GeneReader {
     const Effect& effect = table_.effects()[e];
     const toml::table* section = node.as_table();
     if (section == nullptr) {
-      errors_.add(node, effect.name + " is " + toml_type_name(node) +
-                            ", expected the section [genes." + effect.name +
-                            "] with its parameters");
+      errors_.wrong_type(effect.name, node,
+                         "the section [genes." + effect.name + "] with its parameters");
       return;
     }
     std::vector<std::string> known = mapped(effect.parameters, &Parameter::key);
@@ -185,15 +160,12 @@ class GeneReader {
       TomlSection section(*table, "[genes." + parameter.key + "]", errors_);
       if (read_spelled_out(section, gene)) genes_.push_back(gene);
     } else {
-      errors_.add(node,
-                  "gene " + parameter.key + " is " + toml_type_name(node) + ", expected " + kForms);
+      errors_.wrong_type("gene " + parameter.key, node, kForms);
     }
   }
 
   bool read_spelled_out(TomlSection& section, Gene& gene) {
-    if (const auto scale = section.choice("scale", kScaleNames)) {
-      gene.scale = *scale == 1 ? ParameterScale::kLog : ParameterScale::kLinear;
-    }
+    section.read("scale", gene.scale, kScaleNames);
     const toml::node* range = section.find("range");
     section.finish();
     if (range == nullptr) return check_scale(section.table(), gene);
@@ -201,7 +173,7 @@ class GeneReader {
     if (range->is_string() && range->as_string()->get() == "table") {
       return check_scale(*range, gene);
     }
-    errors_.add(*range, "range is " + toml_type_name(*range) + ", expected [lower, upper]");
+    errors_.wrong_type("range", *range, "[lower, upper]");
     return false;
   }
 

@@ -63,8 +63,7 @@ void read_model_fitness(TomlSection& top, Model& model) {
     // A failed run's best may be infinitely bad; that is no reason not to read its model.
     if (const toml::node* value = section.find("value")) {
       model.score = value->is_number() ? value->value<double>() : std::nullopt;
-      if (!model.score)
-        section.fail("value", "value is " + toml_type_name(*value) + ", expected a number");
+      if (!model.score) section.errors().wrong_type("value", *value, "a number");
     }
     read_fitness(section, model.fitness);
   });

@@ -3,6 +3,7 @@
 #include <array>
 #include <string_view>
 
+#include "common/base/ranges.h"
 #include "common/config/config.h"
 #include "common/config/sections.h"
 
@@ -18,9 +19,7 @@ DefaultOptimiser default_kind(const toml::table& config) {
   const toml::table* evolution = config["evolution"].as_table();
   if (evolution == nullptr) return {};
   for (const auto& [key, value] : *evolution) {
-    const bool for_all =
-        std::find(kForAllKinds.begin(), kForAllKinds.end(), key.str()) != kForAllKinds.end();
-    if (for_all) continue;
+    if (contains(kForAllKinds, key.str())) continue;
     return {OptimiserKind::kGenetic,
             "searches by the genetic algorithm, because [evolution] sets its '" +
                 std::string(key.str()) +
@@ -49,8 +48,8 @@ const std::vector<KeyOfKinds> kKeysOfKinds = {
 };
 
 bool reads(OptimiserKind kind, const toml::table& evolution, std::string_view key) {
-  const bool for_all = std::ranges::find(kForAllKinds, key) != kForAllKinds.end();
-  if (for_all || kind == Kind::kGenetic || key == "asynchronous" || key == "islands") return true;
+  if (contains(kForAllKinds, key) || kind == Kind::kGenetic) return true;
+  if (key == "asynchronous" || key == "islands") return true;
   if (key != "population") return false;
   return kind == Kind::kNsga2 || kind == Kind::kRandomSearch ||
          evolution.contains("asynchronous") || evolution.contains("islands");
@@ -60,7 +59,7 @@ bool reads(OptimiserKind kind, std::string_view key) {
   const auto row = std::ranges::find(kKeysOfKinds, key, &KeyOfKinds::key);
   if (row == kKeysOfKinds.end()) return true;
   if (kind == Kind::kAutoSearch) return row->automatic;
-  return std::ranges::find(row->kinds, kind) != row->kinds.end();
+  return contains(row->kinds, kind);
 }
 
 }  // namespace
@@ -105,19 +104,18 @@ std::string unread_by_search(std::string_view config_text, OptimiserKind kind) {
 
 void read_optimiser(TomlSection& top, OptimiserSettings& to) {
   to.kind = default_kind(top.table()).kind;
-  auto section = top.section("optimiser");
-  if (!section) return;
-  section->read("kind", to.kind, optimiser_names());
-  section->read("population", to.population, 4, 1000000);
-  section->read("differential_weight", to.differential_weight, 0.01, 2);
-  section->read("crossover_rate", to.crossover_rate, 0, 1);
-  section->read("sigma", to.sigma, 1e-4, 1);
-  section->read("iterations", to.iterations, 1, 1000000);
-  section->read("local", to.local, kLocalNames);
-  section->read("step", to.step, 1e-6, 0.5);
-  section->read("local_evaluations", to.local_evaluations, 0, 1000000);
-  section->read("restarts", to.restarts, kRestartNames);
-  section->finish();
+  top.within("optimiser", [&](TomlSection& section) {
+    section.read("kind", to.kind, optimiser_names());
+    section.read("population", to.population, 4, 1000000);
+    section.read("differential_weight", to.differential_weight, 0.01, 2);
+    section.read("crossover_rate", to.crossover_rate, 0, 1);
+    section.read("sigma", to.sigma, 1e-4, 1);
+    section.read("iterations", to.iterations, 1, 1000000);
+    section.read("local", to.local, kLocalNames);
+    section.read("step", to.step, 1e-6, 0.5);
+    section.read("local_evaluations", to.local_evaluations, 0, 1000000);
+    section.read("restarts", to.restarts, kRestartNames);
+  });
 }
 
 }  // namespace gapfarm

@@ -30,15 +30,14 @@ std::optional<Eigen::MatrixXd> read_rows(TomlSection& section, const std::string
 }
 
 void read_weights(TomlSection& section, const Model& model, ResidualTerm* term) {
-  auto weights = section.section("weights");
-  if (!weights) return;
-  const auto read = [&](const std::string& key, const std::string& command) {
-    auto rows = read_rows(*weights, key, 3);
-    if (rows) term->weights.push_back({command, std::move(*rows)});
-  };
-  read(kAll, "");
-  for (const CommandSpec& c : model.commands) read(c.name, c.name);
-  weights->finish();
+  section.within("weights", [&](TomlSection& weights) {
+    const auto read = [&](const std::string& key, const std::string& command) {
+      auto rows = read_rows(weights, key, 3);
+      if (rows) term->weights.push_back({command, std::move(*rows)});
+    };
+    read(kAll, "");
+    for (const CommandSpec& c : model.commands) read(c.name, c.name);
+  });
 }
 
 ResidualTerm read_term(TomlSection& section, const Model& model) {

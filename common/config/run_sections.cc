@@ -107,93 +107,84 @@ bool is_endpoint(const std::string& text) {
 
 }  // namespace
 
-void read_evolution(TomlSection& top, EvolutionSettings& to) {
-  auto section = top.section("evolution");
-  if (!section) return;
-  section->read("population", to.population, 2, kMany);
-  section->read("elitism", to.elitism, 0, kMany);
-  section->read("selection", to.selection, kSelectionNames);
-  section->read("tournament_size", to.tournament_size, 1, kMany);
-  section->read("rank_pressure", to.rank_pressure, 1.01, 2);
-  read_kinds(*section, "crossovers", kCrossoverNames, to.crossovers);
-  read_kinds(*section, "mutations", kMutationNames, to.mutations);
-  section->read("order", to.order, kOrderNames);
-  section->read("crossover_probability", to.crossover_probability, 0, 1);
-  section->read("mutation_probability", to.mutation_probability, 0, 1);
-  section->read("gene_mutation_share", to.gene_mutation_share, 0, 1);
-  section->read("mutation_sigma", to.mutation_sigma, 1e-6, 1);
-  section->read("blend_alpha", to.blend_alpha, 0, 2);
-  section->read("self_adaptation", to.self_adaptation);
-  section->read("probability_floor", to.probability_floor, 0, 0.5);
-  section->read("elite_replicates", to.elite_replicates, 1, 10000);
-  section->read("seed_nominal", to.seed_nominal);
-  section->read("restart_generations", to.restart_generations, 1);
-  section->read("islands", to.islands, 1, 10000);
-  section->read("asynchronous", to.asynchronous);
-  read_stop(*section, to);
-  check_evolution(*section, to);
-  section->finish();
+void read_evolution(TomlSection& section, EvolutionSettings& to) {
+  section.read("population", to.population, 2, kMany);
+  section.read("elitism", to.elitism, 0, kMany);
+  section.read("selection", to.selection, kSelectionNames);
+  section.read("tournament_size", to.tournament_size, 1, kMany);
+  section.read("rank_pressure", to.rank_pressure, 1.01, 2);
+  read_kinds(section, "crossovers", kCrossoverNames, to.crossovers);
+  read_kinds(section, "mutations", kMutationNames, to.mutations);
+  section.read("order", to.order, kOrderNames);
+  section.read("crossover_probability", to.crossover_probability, 0, 1);
+  section.read("mutation_probability", to.mutation_probability, 0, 1);
+  section.read("gene_mutation_share", to.gene_mutation_share, 0, 1);
+  section.read("mutation_sigma", to.mutation_sigma, 1e-6, 1);
+  section.read("blend_alpha", to.blend_alpha, 0, 2);
+  section.read("self_adaptation", to.self_adaptation);
+  section.read("probability_floor", to.probability_floor, 0, 0.5);
+  section.read("elite_replicates", to.elite_replicates, 1, 10000);
+  section.read("seed_nominal", to.seed_nominal);
+  section.read("restart_generations", to.restart_generations, 1);
+  section.read("islands", to.islands, 1, 10000);
+  section.read("asynchronous", to.asynchronous);
+  read_stop(section, to);
+  check_evolution(section, to);
 }
 
-void read_farm(TomlSection& top, FarmSettings& to) {
-  auto section = top.section("farm");
-  if (!section) return;
-  section->read("workers", to.workers, 0, 1024);
-  if (std::string listen = "ipc://"; section->find("listen") != nullptr) {
-    section->read("listen", listen);
+void read_farm(TomlSection& section, FarmSettings& to) {
+  section.read("workers", to.workers, 0, 1024);
+  if (std::string listen = "ipc://"; section.find("listen") != nullptr) {
+    section.read("listen", listen);
     if (!is_endpoint(listen)) {
-      section->fail("listen", "listen is " + quoted_word(listen) +
-                                  ", expected an endpoint such as \"tcp://0.0.0.0:5555\"");
+      section.fail("listen", "listen is " + quoted_word(listen) +
+                                 ", expected an endpoint such as \"tcp://0.0.0.0:5555\"");
     }
     to.listen = std::move(listen);
   }
-  section->read("window", to.window, 1, 1024);
+  section.read("window", to.window, 1, 1024);
   // ZeroMQ's own heartbeat time-to-live overflows above 65.5 s.
-  section->read("heartbeat_interval", to.heartbeat_interval_s, 0.01, 60, "s");
-  section->read("silence_limit", to.silence_limit_s, 0.05, 3600, "s");
+  section.read("heartbeat_interval", to.heartbeat_interval_s, 0.01, 60, "s");
+  section.read("silence_limit", to.silence_limit_s, 0.05, 3600, "s");
   if (to.silence_limit_s <= to.heartbeat_interval_s) {
     const char* key =
-        section->table().contains("silence_limit") ? "silence_limit" : "heartbeat_interval";
-    section->fail(key, "silence_limit is " + format_double(to.silence_limit_s) +
-                           " s, expected more than heartbeat_interval (" +
-                           format_double(to.heartbeat_interval_s) + " s)");
+        section.table().contains("silence_limit") ? "silence_limit" : "heartbeat_interval";
+    section.fail(key, "silence_limit is " + format_double(to.silence_limit_s) +
+                          " s, expected more than heartbeat_interval (" +
+                          format_double(to.heartbeat_interval_s) + " s)");
   }
-  section->read("progress_limit", to.progress_limit_s, 0, 1e6, "s");
-  section->read("answer_limit", to.answer_limit_s, 0, 1e6, "s");
-  section->read("failure_limit", to.failure_limit, 1, 1000);
-  section->read("kill_limit", to.kill_limit, 1, 1000000);
-  section->read("audit_share", to.audit_share, 0, 1);
-  section->read("straggler_factor", to.straggler_factor, 0, 1e6);
-  section->read("allow_mixed_numeric_classes", to.allow_mixed_numeric_classes);
-  section->finish();
+  section.read("progress_limit", to.progress_limit_s, 0, 1e6, "s");
+  section.read("answer_limit", to.answer_limit_s, 0, 1e6, "s");
+  section.read("failure_limit", to.failure_limit, 1, 1000);
+  section.read("kill_limit", to.kill_limit, 1, 1000000);
+  section.read("audit_share", to.audit_share, 0, 1);
+  section.read("straggler_factor", to.straggler_factor, 0, 1e6);
+  section.read("allow_mixed_numeric_classes", to.allow_mixed_numeric_classes);
 }
 
-void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
+void read_simulate(TomlSection& section, const std::vector<CommandSpec>& commands,
                    SimulateSettings& to) {
-  auto section = top.section("simulate");
-  if (!section) return;
   static const std::string plans[] = {"grid", "free"};
-  section->read("plan", to.plan, plans);
-  section->read("sessions", to.sessions, 1, kMany);
-  section->read("trials_per_session", to.trials_per_session, 1, kMany);
-  section->read("chain", to.chain, 1, kMany);
-  section->read("pause", to.pause_s, 0, 3600, "s");
-  section->read("arena", to.arena_m, 0.1, 100, "m");
-  if (auto levels = section->numbers("levels", 0, 1)) {
-    if (levels->empty()) section->fail("levels", "levels is empty, expected at least one");
+  section.read("plan", to.plan, plans);
+  section.read("sessions", to.sessions, 1, kMany);
+  section.read("trials_per_session", to.trials_per_session, 1, kMany);
+  section.read("chain", to.chain, 1, kMany);
+  section.read("pause", to.pause_s, 0, 3600, "s");
+  section.read("arena", to.arena_m, 0.1, 100, "m");
+  if (auto levels = section.numbers("levels", 0, 1)) {
+    if (levels->empty()) section.fail("levels", "levels is empty, expected at least one");
     to.levels = std::move(*levels);
   }
-  if (auto durations = section->numbers("durations", 0, 60, "s")) {
+  if (auto durations = section.numbers("durations", 0, 60, "s")) {
     to.durations_s = std::move(*durations);
   }
-  check_commands(*section, commands, to);
-  read_free_plan(*section, to);
-  section->read("path_interval", to.path_interval_s, 0, 60, "s");
+  check_commands(section, commands, to);
+  read_free_plan(section, to);
+  section.read("path_interval", to.path_interval_s, 0, 60, "s");
   if (to.path_interval_s != 0 && to.path_interval_s < kLeastPathInterval_s) {
-    section->fail("path_interval",
-                  "path_interval is too fine, expected 0 (no paths) or at least 0.0001 s");
+    section.fail("path_interval",
+                 "path_interval is too fine, expected 0 (no paths) or at least 0.0001 s");
   }
-  section->finish();
 }
 
 }  // namespace gapfarm

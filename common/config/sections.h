@@ -19,8 +19,14 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
 // direction and noisy of [objective], in configs and models.
 void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettings& spread);
 
-// Each reads its section of `top` (when it is there) into the settings and reports what is wrong.
-void read_parameters(TomlSection& top, const ParameterTable& table, ParameterValues& values);
+// Each reads its section into the settings and reports what is wrong.
+void read_parameters(TomlSection& section, const ParameterTable& table, ParameterValues& values);
+void read_evolution(TomlSection& section, EvolutionSettings& evolution);
+void read_farm(TomlSection& section, FarmSettings& farm);
+void read_simulate(TomlSection& section, const std::vector<CommandSpec>& commands,
+                   SimulateSettings& simulate);
+
+// Each reads its section of `top` (when it is there) in the same way.
 void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues& values);
 // What [effects] may hold: a key in the section of its effect, and its row.
 using EffectRowReader =
@@ -87,11 +93,7 @@ void origin_sections(Rows& top, Of& model) {
 // In a model a value stands beside it.
 void read_fitness(TomlSection& section, FitnessSettings& fitness);
 void read_spread(TomlSection& top, SpreadSettings& spread);
-void read_evolution(TomlSection& top, EvolutionSettings& evolution);
 void read_optimiser(TomlSection& top, OptimiserSettings& optimiser);
-void read_farm(TomlSection& top, FarmSettings& farm);
-void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
-                   SimulateSettings& simulate);
 
 // [residual] of a model; nothing is written where there is none.
 void read_residual(TomlSection& top, Model& model);

@@ -45,18 +45,6 @@ std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml:
   return nodes;
 }
 
-std::string toml_type_name(const toml::node& node) {
-  // By toml::node_type; what follows these are dates and times.
-  constexpr std::array kNames = {"nothing",    "a section", "an array", "a string",
-                                 "an integer", "a number",  "a boolean"};
-  const auto type = static_cast<std::size_t>(node.type());
-  return type < kNames.size() ? kNames[type] : "a date or time";
-}
-
-std::string one_of(std::span<const std::string> names) {
-  return "one of \"" + joined(names, "\", \"") + "\"";
-}
-
 std::string toml_string(std::string_view text) {
   constexpr char kHex[] = "0123456789abcdef";
   std::string quoted = "\"";
@@ -85,9 +73,14 @@ const toml::node* TomlSection::find(std::string_view key) {
   return table == nullptr || table == table_ ? nullptr : table->get(key);
 }
 
-void TomlSection::wrong_type(std::string_view key, const toml::node& node,
-                             const std::string& expected) {
-  errors_->add(node, std::string(key) + " is " + toml_type_name(node) + ", expected " + expected);
+void TomlErrors::wrong_type(std::string_view key, const toml::node& node,
+                            const std::string& expected) {
+  // By toml::node_type; what follows these are dates and times.
+  constexpr std::array kNames = {"nothing",    "a section", "an array", "a string",
+                                 "an integer", "a number",  "a boolean"};
+  const auto type = static_cast<std::size_t>(node.type());
+  const std::string is = type < kNames.size() ? kNames[type] : "a date or time";
+  add(node, std::string(key) + " is " + is + ", expected " + expected);
 }
 
 template <class T, class One>
@@ -107,7 +100,7 @@ std::optional<std::vector<T>> TomlSection::list(std::string_view key, One one) {
 std::optional<double> TomlSection::number_of(std::string_view key, const toml::node& node,
                                              double lower, double upper, std::string_view unit) {
   if (!node.is_number()) {
-    wrong_type(key, node, number_range(lower, upper, unit));
+    errors_->wrong_type(key, node, number_range(lower, upper, unit));
     return {};
   }
   const double value = *node.value<double>();
@@ -117,17 +110,17 @@ std::optional<double> TomlSection::number_of(std::string_view key, const toml::n
   return {};
 }
 
-std::optional<std::size_t> TomlSection::choice_of(std::string_view key, const toml::node& node,
-                                                  std::span<const std::string> names) {
+std::optional<std::size_t> TomlErrors::choice(std::string_view key, const toml::node& node,
+                                              std::span<const std::string> names) {
   const auto* word = node.as_string();
   if (word == nullptr) {
-    wrong_type(key, node, one_of(names));
+    wrong_type(key, node, "one of \"" + joined(names, "\", \"") + "\"");
     return {};
   }
   const auto found = std::find(names.begin(), names.end(), word->get());
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
-  errors_->add(node, "unknown " + std::string(key) + " " + quoted_word(word->get()) +
-                         suggestion(word->get(), names));
+  add(node, "unknown " + std::string(key) + " " + quoted_word(word->get()) +
+                suggestion(word->get(), names));
   return {};
 }
 
@@ -159,7 +152,7 @@ std::optional<std::uint64_t> TomlSection::count(std::string_view key, std::uint6
   const auto* value = node->as_integer();
   if (const auto beyond = count_of_text(*node); unbounded && beyond) return beyond;
   if (value == nullptr) {
-    wrong_type(key, *node, expected);
+    errors_->wrong_type(key, *node, expected);
     return {};
   }
   const std::int64_t found = value->get();
@@ -175,13 +168,13 @@ std::optional<std::size_t> TomlSection::choice(std::string_view key,
                                                std::span<const std::string> names) {
   const toml::node* node = find(key);
   if (node == nullptr) return {};
-  return choice_of(key, *node, names);
+  return errors_->choice(key, *node, names);
 }
 
 std::optional<std::vector<std::string>> TomlSection::strings(std::string_view key) {
   return list<std::string>(key, [&](const toml::node& element) {
     std::optional<std::string> value = element.value_exact<std::string>();
-    if (!value) wrong_type(key, element, "strings");
+    if (!value) errors_->wrong_type(key, element, "strings");
     return value;
   });
 }
@@ -190,7 +183,7 @@ std::optional<std::vector<std::size_t>> TomlSection::choices(std::string_view ke
                                                              std::span<const std::string> names) {
   std::vector<std::size_t> seen;
   return list<std::size_t>(key, [&](const toml::node& element) {
-    std::optional<std::size_t> value = choice_of(key, element, names);
+    std::optional<std::size_t> value = errors_->choice(key, element, names);
     if (value && contains(seen, *value)) {
       errors_->add(element, std::string(key) + " names " + quoted_word(names[*value]) + " twice");
       value.reset();
@@ -242,7 +235,7 @@ std::optional<TomlSection> TomlSection::section(std::string_view key) {
   if (node == nullptr) return {};
   const std::string name = "[" + path_of(key) + "]";
   if (const toml::table* table = node->as_table()) return TomlSection(*table, name, *errors_);
-  wrong_type(key, *node, "the section " + name);
+  errors_->wrong_type(key, *node, "the section " + name);
   return {};
 }
 
@@ -256,7 +249,7 @@ std::vector<TomlSection> TomlSection::sections(std::string_view key, const std::
     if (const toml::table* table = (*array)[i].as_table()) {
       all.emplace_back(*table, name, *errors_);
     } else {
-      wrong_type(key, (*array)[i], "sections " + name);
+      errors_->wrong_type(key, (*array)[i], "sections " + name);
     }
   }
   return all;

@@ -27,6 +27,11 @@ class TomlErrors {
   void add(const toml::node& node, const std::string& sentence) {
     add(node.source().begin, sentence);
   }
+  // The value of `key` is of another type than `expected`.
+  void wrong_type(std::string_view key, const toml::node& node, const std::string& expected);
+  // Which of `names` the word is; none, and an error: it is no word, or an unknown one.
+  std::optional<std::size_t> choice(std::string_view key, const toml::node& node,
+                                    std::span<const std::string> names);
   bool empty() const { return found_.empty(); }
   // REQUIRES: !empty().  One line each, in the file's order.
   Error error() const;
@@ -46,10 +51,6 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file);
 // toml++ sorts keys; the author's order means something.
 std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table);
 
-// "a string", "an array", for sentences.
-std::string toml_type_name(const toml::node& node);
-// "one of "a", "b"", for sentences.
-std::string one_of(std::span<const std::string> names);
 // A basic string as TOML has it, quoted, on one line.
 std::string toml_string(std::string_view text);
 
@@ -85,11 +86,11 @@ class TomlSection {
   std::optional<TomlSection> section(std::string_view key);
   // Those of [[key]], one at least; the error is `missing` where there is none.
   std::vector<TomlSection> sections(std::string_view key, const std::string& missing);
-  // Lets `use` read the section when it is there, the whole of it; whether it is.
-  template <class Use>
-  bool within(std::string_view key, const Use& use) {
+  // Lets `use` read the section when it is there, the whole of it, into `to`; whether it is.
+  template <class Use, class... To>
+  bool within(std::string_view key, const Use& use, To&... to) {
     std::optional<TomlSection> own = section(key);
-    if (own) use(*own);
+    if (own) use(*own, to...);
     if (own) own->finish();
     return own.has_value();
   }
@@ -125,11 +126,8 @@ class TomlSection {
 
  private:
   void finish(const toml::table& table, const std::string& prefix);
-  void wrong_type(std::string_view key, const toml::node& node, const std::string& expected);
   std::optional<double> number_of(std::string_view key, const toml::node& node, double lower,
                                   double upper, std::string_view unit);
-  std::optional<std::size_t> choice_of(std::string_view key, const toml::node& node,
-                                       std::span<const std::string> names);
   std::optional<std::uint64_t> count(std::string_view key, std::uint64_t lower,
                                      std::uint64_t upper);
   // The key from the top.
@@ -139,7 +137,7 @@ class TomlSection {
     const toml::node* node = find(key);
     if (node == nullptr) return;
     const auto* value = node->as<T>();
-    value == nullptr ? wrong_type(key, *node, expected) : void(to = value->get());
+    value == nullptr ? errors_->wrong_type(key, *node, expected) : void(to = value->get());
   }
   // What `one` makes of every element, or of the node alone; none: of one of them nothing.
   template <class T, class One>

@@ -105,21 +105,16 @@ void read_wheel(TomlSection& own, RobotWheel& wheel) {
   wheel_rows(own, wheel);
   own.read("roller_angle", wheel.roller_angle_rad, -7, 7, "rad");
   own.read("group", wheel.group);
-  own.finish();
 }
 
 void read_wheels(TomlSection& top, std::vector<RobotWheel>& wheels) {
-  auto section = top.section("wheels");
-  if (!section) return;
-  for (const auto& [name, node] : in_file_order(section->table())) {
-    auto own = section->section(name);
-    if (!own) continue;
-    RobotWheel wheel;
-    wheel.name = name;
-    read_wheel(*own, wheel);
-    wheels.push_back(std::move(wheel));
-  }
-  section->finish();
+  top.within("wheels", [&](TomlSection& section) {
+    for (const auto& [name, node] : in_file_order(section.table())) {
+      RobotWheel wheel;
+      wheel.name = name;
+      if (section.within(name, read_wheel, wheel)) wheels.push_back(std::move(wheel));
+    }
+  });
 }
 
 void read_steering_table(TomlSection& top, RobotSteering& steering) {
@@ -183,11 +178,9 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
   TomlSection top(parsed, "", errors);
   GroundRobot robot;
   top.read("name", robot.name);
-  if (const auto drive = top.choice("drive", drive_names())) {
-    robot.drive = static_cast<DriveKind>(*drive);
-  } else if (!parsed.contains("drive")) {
-    std::string known = joined(drive_names());
-    return Error{path + ": no key 'drive', expected one of " + known};
+  top.read("drive", robot.drive, drive_names());
+  if (!parsed.contains("drive")) {
+    return Error{path + ": no key 'drive', expected one of " + joined(drive_names())};
   }
   read_commands(top, robot);
   top_rows(top, robot);
