@@ -107,10 +107,9 @@ EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
     const Pose& X = trials[i].X_WE;
     position.push_back(std::hypot(ends[i].x - X.x, ends[i].y - X.y));
     heading.push_back(std::abs(wrap_angle(ends[i].theta - X.theta)));
-    errors.mean_m += whole.back();
   }
   errors.trials = trials.size();
-  errors.mean_m /= static_cast<double>(trials.size());
+  errors.mean_m = mean(whole);
   errors.median_m = median(whole);
   errors.median_position_m = median(position);
   errors.median_heading_rad = median(heading);

@@ -253,22 +253,16 @@ class InfluenceStudy {
 
   void summarise_steps(const std::vector<double>& steps, std::size_t f, FactorInfluence& to) const {
     if (steps.empty()) return;
-    const auto mean = [&](std::span<const std::size_t> members) {
-      double sum = 0;
-      for (const std::size_t i : members) sum += steps[i];
-      return sum / static_cast<double>(members.size());
+    const auto mean_of = [&](std::span<const std::size_t> members) {
+      return mean(mapped(members, [&](std::size_t i) { return steps[i]; }));
     };
-    std::vector<std::vector<std::size_t>> blocks;
-    std::vector<std::size_t> all;
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-      blocks.push_back({i});
-      all.push_back(i);
-    }
-    const double middle = to.morris.distance = mean(all);
-    for (const double step : steps) to.sigma += (step - middle) * (step - middle);
-    to.sigma = std::sqrt(to.sigma / static_cast<double>(steps.size()));
+    const double middle = to.morris.distance = mean(steps);
+    to.sigma = std::sqrt(
+        mean(mapped(steps, [&](double step) { return (step - middle) * (step - middle); })));
+    const auto blocks =
+        mapped(indices(steps.size()), [](std::size_t i) { return std::vector<std::size_t>{i}; });
     Stream stream({settings_.trace.seed, Purpose::kStatistics, 2, f});
-    to.morris.distance_95 = bootstrap_interval(blocks, mean, 0.95, kBootstrap, stream);
+    to.morris.distance_95 = bootstrap_interval(blocks, mean_of, 0.95, kBootstrap, stream);
   }
 
   Farm& farm_;
