@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::size_t kDepartedKept = 1000;
 constexpr std::size_t kOffersKept = 10000;
-constexpr std::size_t kReasonsKept = 100;
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 constexpr const char* kImpure =
@@ -365,8 +364,6 @@ void Scheduler::on_process_end(const ProcessEnded& end) {
   if (!blamed.quarantined) return;
   ++given_up_;
   blamed.reason += values_of_task(blamed.task);
-  if (quarantine_reasons_.size() >= kReasonsKept) quarantine_reasons_.pop_front();
-  quarantine_reasons_.push_back(blamed.reason);
   report(FarmEvent::kQuarantined, end.name, blamed.reason);
   cancel(blamed.losers);
 }

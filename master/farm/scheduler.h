@@ -114,8 +114,6 @@ class Scheduler {
   std::vector<FleetStatus> fleet_status() const { return fleets_.status(last_tick_); }
   FarmTally tally() const;                              // but for the links
   std::uint64_t given_up() const { return given_up_; }  // jobs
-  // What was given up and why, of this life of the master; the latest.
-  const std::deque<std::string>& quarantine_reasons() const { return quarantine_reasons_; }
 
  private:
   void on_hello(const std::string& peer, const v1::Hello& hello, double now);
@@ -161,7 +159,6 @@ class Scheduler {
     v1::Offer::Answer answer;
   };
   std::deque<Offered> offers_;  // that came between batches
-  std::deque<std::string> quarantine_reasons_;
   std::vector<Outgoing> outbox_;
   FarmTally tally_;
   std::uint64_t given_up_ = 0;

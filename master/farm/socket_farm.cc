@@ -1,7 +1,6 @@
 #include "master/farm/socket_farm.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <random>
 
 #include "common/base/build_info.h"
@@ -17,19 +16,6 @@ constexpr double kProgressInterval = 0.1;  // s
 constexpr double kReapInterval = 0.05;     // s, while messages keep the loop busy
 // As long as a socket's last messages may take to get out (SocketOptions::linger_s).
 constexpr double kFarewellLimit_s = 1;
-
-void complain(const FarmEvent& event) {
-  switch (event.kind) {
-    case FarmEvent::kJoined:
-    case FarmEvent::kReturned:
-    case FarmEvent::kLeft:
-      return;
-    default:
-      std::fprintf(stderr, "gapfarm: %s%s\n",
-                   event.worker.empty() ? "" : ("worker " + event.worker + ": ").c_str(),
-                   event.text.c_str());
-  }
-}
 
 // The count distinguishes the lives of one run, the random bits those of different runs that one
 // worker serves one after the other: their counts, and so their attempt ids, may be the same.
@@ -52,7 +38,7 @@ Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options
 void SocketFarm::on_event(const FarmEvent& event) {
   if (event.kind == FarmEvent::kJoined && locals_) locals_->confirm(event.worker);
   if (event.kind == FarmEvent::kRefused) last_trouble_ = event.text;
-  (options_.on_event ? options_.on_event : complain)(event);
+  if (options_.on_event) options_.on_event(event);
 }
 
 Status SocketFarm::open() {

@@ -20,7 +20,7 @@ namespace gapfarm {
 class PrivateFolder;
 
 // Of the scheduler's the epoch counts lives of the master so far, below 2^24; the build's
-// fingerprint is filled in; without `on_event` what went wrong goes to stderr.
+// fingerprint is filled in.
 struct SocketFarmOptions : SchedulerOptions {
   unsigned local_workers = 0;       // processes to start on this machine
   std::vector<std::string> listen;  // endpoints for workers that come by themselves
@@ -56,10 +56,6 @@ class SocketFarm : public Farm {
   std::uint64_t given_up() const override { return scheduler_->given_up(); }
   std::string numeric_class() const override { return scheduler_->workers().numeric_class(); }
 
-  // See Scheduler.
-  const std::deque<std::string>& quarantine_reasons() const {
-    return scheduler_->quarantine_reasons();
-  }
   // Pids of the running local workers.
   std::vector<int> local_pids() const;
 
