@@ -118,6 +118,12 @@ class TomlSection {
   void read(std::string_view key, std::string& to) { read_typed(key, to, "a string"); }
   void read(std::string_view key, std::vector<std::string>& to);
 
+  // For FIELDS(): a member of that name.
+  template <class T>
+  void field(const char* key, T& to) {
+    read(key, to);
+  }
+
   // An error at the value of `key`, which must exist.
   void fail(std::string_view key, const std::string& sentence);
 

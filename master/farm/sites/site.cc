@@ -6,6 +6,7 @@
 
 #include "common/base/ranges.h"
 #include "common/config/toml_section.h"
+#include "common/json/fields.h"
 
 namespace gapfarm {
 namespace {
@@ -24,49 +25,30 @@ void read_pattern(TomlSection& section, const char* key, std::string* to) {
 Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
   ASSIGN_OR_RETURN(const toml::table table, parse_toml(text, file));
   TomlErrors errors(file);
-  TomlSection top(table, "", errors);
-  ClusterSite site;
-  top.read("system", site.system);
-  top.read("hosts", site.hosts);
-  top.read("jobs_per_host", site.jobs_per_host, 0, 100000);
-  top.read("submit", site.submit);
-  top.read("script", site.script);
-  top.read("script_a_job", site.script_a_job);
-  top.read("block", site.block, 1, 100000);
-  read_pattern(top, "submitted", &site.submitted);
-  top.read("ids", site.ids);
-  top.read("first_index", site.first_index, 0, 1);
-  read_pattern(top, "limit", &site.limit);
-  top.read("wall", site.wall);
-  top.read("several", site.several);
-  top.read("avoid", site.avoid);
-  top.read("nodes_between", site.nodes_between);
-  top.read("list", site.list);
-  read_pattern(top, "line", &site.line);
-  top.read("columns", site.columns);
-  top.read("queued", site.queued);
-  top.read("ended", site.ended);
-  top.read("stuck", site.stuck);
-  top.read("cancel", site.cancel);
-  top.read("log", site.log);
-  top.read("master", site.master);
-  top.read("requeue", site.requeue);
-  top.read("worker", site.worker);
-  top.read("keys", site.keys);
-  top.read("allow_external", site.allow_external);
-  top.read("interval", site.interval_s, 0.1, 3600, "s");
-  top.read("backoff", site.backoff_s, 0.1, 3600, "s");
-  top.finish();
+  TomlSection v(table, "", errors);
+  ClusterSite row;
+  FIELDS(system, hosts, submit, script, script_a_job, ids, wall, several, avoid, nodes_between,
+         list, columns, queued, ended, stuck, cancel, log, master, requeue, worker, keys,
+         allow_external)
+  v.read("jobs_per_host", row.jobs_per_host, 0, 100000);
+  v.read("block", row.block, 1, 100000);
+  v.read("first_index", row.first_index, 0, 1);
+  v.read("interval", row.interval_s, 0.1, 3600, "s");
+  v.read("backoff", row.backoff_s, 0.1, 3600, "s");
+  read_pattern(v, "submitted", &row.submitted);
+  read_pattern(v, "limit", &row.limit);
+  read_pattern(v, "line", &row.line);
+  v.finish();
   if (!errors.empty()) return errors.error();
-  for (const auto& [key, there] : {std::pair{"submit", !site.submit.empty()},
-                                   {"list", !site.list.empty()},
-                                   {"cancel", !site.cancel.empty()},
-                                   {"line", !site.line.empty()},
-                                   {"columns", !site.columns.empty()},
-                                   {"submitted", !site.submitted.empty()}}) {
+  for (const auto& [key, there] : {std::pair{"submit", !row.submit.empty()},
+                                   {"list", !row.list.empty()},
+                                   {"cancel", !row.cancel.empty()},
+                                   {"line", !row.line.empty()},
+                                   {"columns", !row.columns.empty()},
+                                   {"submitted", !row.submitted.empty()}}) {
     if (!there) return Error{file + ": has no '" + key + "'; see configs/sites/slurm.toml"};
   }
-  return site;
+  return row;
 }
 
 std::string expand(const std::string& text, const SiteValues& values) {
