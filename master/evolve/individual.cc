@@ -236,32 +236,26 @@ std::vector<Individual> CountingOptimiser::members() const {
   return members;
 }
 
-void CountingOptimiser::save_counts(bool with_best, v1::GeneticState& message) const {
-  message.set_generation(generation_);
-  message.set_next_birth_id(next_birth_id_);
-  message.set_evaluations(evaluations_);
-  message.set_last_improvement(last_improvement_);
-  for (const Individual& individual : population_) save(individual, *message.add_population());
-  if (with_best && generation_ > 0) save(best_, *message.add_hall());
-  save_seen(seen_, noisy_, message);
+void CountingOptimiser::save_counts(bool with_best, v1::GeneticState& state) const {
+  SAVE_STATE(generation, next_birth_id, evaluations, last_improvement)
+  for (const Individual& individual : population_) save(individual, *state.add_population());
+  if (with_best && generation_ > 0) save(best_, *state.add_hall());
+  save_seen(seen_, noisy_, state);
 }
 
-Status CountingOptimiser::restore_counts(bool with_best, const v1::GeneticState& message) {
-  RETURN_IF_ERROR(load_seen(message, seen_));
-  if (message.generation() > 0 &&
-      (message.population_size() == 0 || (with_best && message.hall_size() == 0))) {
+Status CountingOptimiser::restore_counts(bool with_best, const v1::GeneticState& state) {
+  RETURN_IF_ERROR(load_seen(state, seen_));
+  if (state.generation() > 0 &&
+      (state.population_size() == 0 || (with_best && state.hall_size() == 0))) {
     return Error{"the saved optimiser state is damaged: it has no population or no best"};
   }
-  for (const v1::Individual& saved : message.population()) {
+  for (const v1::Individual& saved : state.population()) {
     ASSIGN_OR_RETURN(population_.emplace_back(), load(saved, space_));
   }
-  if (with_best && message.generation() > 0) {
-    ASSIGN_OR_RETURN(best_, load(message.hall(0), space_));
+  if (with_best && state.generation() > 0) {
+    ASSIGN_OR_RETURN(best_, load(state.hall(0), space_));
   }
-  generation_ = message.generation();
-  next_birth_id_ = message.next_birth_id();
-  evaluations_ = message.evaluations();
-  last_improvement_ = message.last_improvement();
+  LOAD_STATE(generation, next_birth_id, evaluations, last_improvement)
   return {};
 }
 

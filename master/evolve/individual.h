@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/detail/macro_scope.hpp>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -82,6 +83,12 @@ Result<Message> parse_state(std::string_view state) {
   return Error{"the saved optimiser state is damaged: it cannot be decoded"};
 }
 
+// Members `name_` of an optimiser in its message `state`.
+#define SAVE_STATE_(name) state.set_##name(name##_);
+#define LOAD_STATE_(name) name##_ = state.name();
+#define SAVE_STATE(...) NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(SAVE_STATE_, __VA_ARGS__))
+#define LOAD_STATE(...) NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(LOAD_STATE_, __VA_ARGS__))
+
 // Individuals and seen genomes in a saved optimiser state.
 void save(const Individual& individual, v1::Individual& message);
 // Errors: another number of genes than the space's, a gene outside [0, 1], a cost that is not
@@ -113,9 +120,9 @@ class CountingOptimiser : public Optimiser {
   // Whom of the population the title goes to, in this generation.
   void update_best(std::uint64_t generation);
   // Everything below that changes; `with_best`: the best is no other than who is preferred.
-  void save_counts(bool with_best, v1::GeneticState& message) const;
+  void save_counts(bool with_best, v1::GeneticState& state) const;
   // Error: the message is not one that save_counts() made for this setup.
-  Status restore_counts(bool with_best, const v1::GeneticState& message);
+  Status restore_counts(bool with_best, const v1::GeneticState& state);
 
   GeneSpace space_;
   std::uint64_t run_seed_;

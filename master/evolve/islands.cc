@@ -285,37 +285,35 @@ std::vector<NamedNumber> IslandsOptimiser::operator_probabilities() const {
 }
 
 std::string IslandsOptimiser::state() const {
-  v1::IslandsState message;
-  for (const Island& island : islands_) message.add_islands(island.now.state);
-  message.set_generation(generation_);
-  message.set_last_improvement(last_improvement_);
-  message.set_first_exchange(shown_.begin()->first);
+  v1::IslandsState state;
+  for (const Island& island : islands_) state.add_islands(island.now.state);
+  SAVE_STATE(generation, last_improvement)
+  state.set_first_exchange(shown_.begin()->first);
   for (const auto& [generation, shown] : shown_) {
     if (generation >= generation_) break;  // the islands have them
     for (const std::vector<Individual>& its : shown) {
-      for (const Individual& individual : its) save(individual, *message.add_exchanged());
+      for (const Individual& individual : its) save(individual, *state.add_exchanged());
     }
   }
-  return message.SerializeAsString();
+  return state.SerializeAsString();
 }
 
-Status IslandsOptimiser::restore(std::string_view state) {
-  ASSIGN_OR_RETURN(const auto message, parse_state<v1::IslandsState>(state));
+Status IslandsOptimiser::restore(std::string_view bytes) {
+  ASSIGN_OR_RETURN(const auto state, parse_state<v1::IslandsState>(bytes));
   const int count = static_cast<int>(islands_.size());
   const Error damaged{
       "the saved state of the islands is damaged or belongs to another number of islands; resume "
       "with the config of the run"};
-  if (message.islands_size() != count || message.generation() == 0) return damaged;
-  generation_ = message.generation();
-  last_improvement_ = message.last_improvement();
+  if (state.islands_size() != count || state.generation() == 0) return damaged;
+  LOAD_STATE(generation, last_improvement)
   for (std::size_t i = 0; i < islands_.size(); ++i) {
-    RETURN_IF_ERROR(islands_[i].optimiser->restore(message.islands(static_cast<int>(i))));
+    RETURN_IF_ERROR(islands_[i].optimiser->restore(state.islands(static_cast<int>(i))));
     islands_[i].now = look_at(i);
     show(i, islands_[i].now);
     if (i == 0 || better_individual(islands_[i].now.best, best_)) best_ = islands_[i].now.best;
   }
-  std::uint64_t generation = message.first_exchange(), last = 0;
-  for (const v1::Individual& saved : message.exchanged()) {
+  std::uint64_t generation = state.first_exchange(), last = 0;
+  for (const v1::Individual& saved : state.exchanged()) {
     ASSIGN_OR_RETURN(Individual individual, load(saved, space_));
     const std::uint64_t island = individual.birth_id % islands_.size();
     if (island < last) ++generation;

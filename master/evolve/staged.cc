@@ -31,26 +31,22 @@ class StagedOptimiser final : public Optimiser {
     return {};
   }
 
-  Status restore(std::string_view state) override {
-    v1::StagedState message;
+  Status restore(std::string_view bytes) override {
+    v1::StagedState state;
     const std::size_t genes = setup_.genes.size();
-    if (!message.ParseFromArray(state.data(), static_cast<int>(state.size())) ||
-        message.stage() >= stages_.size() || !message.has_best() ||
-        static_cast<std::size_t>(message.base_size()) != message.stage() * genes) {
+    if (!state.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
+        state.stage() >= stages_.size() || !state.has_best() ||
+        static_cast<std::size_t>(state.base_size()) != state.stage() * genes) {
       return Error{
           "the saved state of the stages is damaged or belongs to other stages or another "
           "version; resume with the config and the build of the run"};
     }
-    stage_ = message.stage();
-    results_ = stage_results(state, genes);
-    generations_ = message.generations();
-    evaluations_ = message.evaluations();
-    births_ = message.births();
-    last_improvement_ = message.last_improvement();
+    LOAD_STATE(stage, generations, evaluations, births, last_improvement)
+    results_ = stage_results(bytes, genes);
     RETURN_IF_ERROR(begin());
-    RETURN_IF_ERROR(inner_->restore(message.optimiser()));
+    RETURN_IF_ERROR(inner_->restore(state.optimiser()));
     if (stage_ > 0) {
-      const v1::Individual& best = message.best();
+      const v1::Individual& best = state.best();
       const auto outcome = static_cast<v1::Outcome>(best.outcome());
       kept_best_ = {best.birth_id(),
                     results_.back(),
@@ -107,20 +103,16 @@ class StagedOptimiser final : public Optimiser {
   }
 
   std::string state() const override {
-    v1::StagedState message;
-    message.set_stage(stage_);
-    message.set_optimiser(inner_->state());
-    for (const Genome& genome : results_) message.mutable_base()->Add(genome.begin(), genome.end());
-    message.set_generations(generations_);
-    message.set_evaluations(evaluations_);
-    message.set_births(births_);
-    message.set_last_improvement(last_improvement_);
-    v1::Individual* best = message.mutable_best();
+    v1::StagedState state;
+    SAVE_STATE(stage, generations, evaluations, births, last_improvement)
+    state.set_optimiser(inner_->state());
+    for (const Genome& genome : results_) state.mutable_base()->Add(genome.begin(), genome.end());
+    v1::Individual* best = state.mutable_best();
     best->set_birth_id(kept_best_.birth_id);
     best->set_outcome(static_cast<std::uint32_t>(kept_best_.standing.outcome));
     best->set_fitness(kept_best_.standing.cost);
     best->set_scores(kept_best_.standing.scores);
-    return message.SerializeAsString();
+    return state.SerializeAsString();
   }
 
  private:

@@ -85,26 +85,24 @@ class GeneticAlgorithm final : public CountingOptimiser {
 
 std::string GeneticAlgorithm::state() const {
   assert(!plan_ && "save between tell() and ask()");
-  v1::GeneticState message;
-  save_counts(true, message);
-  message.set_last_restart(last_restart_);
-  message.set_restarts(restarts_);
-  if (generation_ > 0) message.set_best_fitness(best_.standing.cost);
-  for (double quality : breeder_.qualities()) message.add_operator_weights(quality);
-  return message.SerializeAsString();
+  v1::GeneticState state;
+  save_counts(true, state);
+  SAVE_STATE(last_restart, restarts)
+  if (generation_ > 0) state.set_best_fitness(best_.standing.cost);
+  for (double quality : breeder_.qualities()) state.add_operator_weights(quality);
+  return state.SerializeAsString();
 }
 
-Status GeneticAlgorithm::restore(std::string_view state) {
-  ASSIGN_OR_RETURN(const auto message, parse_state<v1::GeneticState>(state));
-  RETURN_IF_ERROR(restore_counts(true, message));
-  const std::vector<double> qualities(message.operator_weights().begin(),
-                                      message.operator_weights().end());
+Status GeneticAlgorithm::restore(std::string_view bytes) {
+  ASSIGN_OR_RETURN(const auto state, parse_state<v1::GeneticState>(bytes));
+  RETURN_IF_ERROR(restore_counts(true, state));
+  const std::vector<double> qualities(state.operator_weights().begin(),
+                                      state.operator_weights().end());
   if (!breeder_.restore(qualities)) {
     return Error{"the saved optimiser state has " + std::to_string(qualities.size()) +
                  " operators, but the config names others; resume with the config of the run"};
   }
-  last_restart_ = message.last_restart();
-  restarts_ = message.restarts();
+  LOAD_STATE(last_restart, restarts)
   return {};
 }
 

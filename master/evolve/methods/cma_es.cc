@@ -281,21 +281,13 @@ std::vector<NamedNumber> CmaEs::figures() const {
 
 void CmaEs::save(v1::MethodState& message) const {
   v1::CmaEsState& state = *message.mutable_cma_es();
-  state.set_generation(generation_);
-  state.set_restarts(restarts_);
-  state.set_anywhere(anywhere_);
-  state.set_sigma(sigma_);
+  SAVE_STATE(generation, restarts, anywhere, sigma, small_population, evaluations,
+             large_evaluations, small_evaluations, first_sigma, small_starts)
   state.mutable_mean()->Add(mean_.begin(), mean_.end());
   state.mutable_path_sigma()->Add(path_sigma_.begin(), path_sigma_.end());
   state.mutable_path_c()->Add(path_c_.begin(), path_c_.end());
   state.mutable_covariance()->Add(covariance_.data(), covariance_.data() + covariance_.size());
   state.mutable_bests()->Add(bests_.begin(), bests_.end());
-  state.set_small_population(small_population_);
-  state.set_evaluations(evaluations_);
-  state.set_large_evaluations(large_evaluations_);
-  state.set_small_evaluations(small_evaluations_);
-  state.set_first_sigma(first_sigma_);
-  state.set_small_starts(small_starts_);
 }
 
 Status CmaEs::restore(const v1::MethodState& message) {
@@ -305,21 +297,13 @@ Status CmaEs::restore(const v1::MethodState& message) {
       state.covariance_size() != n * n) {
     return damaged_method_state("CMA-ES");
   }
-  generation_ = state.generation();
-  restarts_ = state.restarts();
-  anywhere_ = state.anywhere();
-  sigma_ = state.sigma();
+  LOAD_STATE(generation, restarts, anywhere, sigma, small_population, evaluations,
+             large_evaluations, small_evaluations, first_sigma, small_starts)
   std::copy(state.mean().begin(), state.mean().end(), mean_.begin());
   std::copy(state.path_sigma().begin(), state.path_sigma().end(), path_sigma_.begin());
   std::copy(state.path_c().begin(), state.path_c().end(), path_c_.begin());
   std::copy(state.covariance().begin(), state.covariance().end(), covariance_.data());
   bests_.assign(state.bests().begin(), state.bests().end());
-  small_population_ = state.small_population();
-  evaluations_ = state.evaluations();
-  large_evaluations_ = state.large_evaluations();
-  small_evaluations_ = state.small_evaluations();
-  first_sigma_ = state.first_sigma();
-  small_starts_ = state.small_starts();
   return {};
 }
 

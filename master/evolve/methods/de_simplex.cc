@@ -84,16 +84,14 @@ std::vector<NamedNumber> DeSimplex::figures() const {
 
 void DeSimplex::save(v1::MethodState& message) const {
   v1::DeSimplexState& state = *message.mutable_de_simplex();
-  state.set_polishing(polishing_);
-  state.set_rounds(rounds_);
+  SAVE_STATE(polishing, rounds)
   differential_.save(*state.mutable_differential());
   simplex_.save(*state.mutable_simplex());
 }
 
 Status DeSimplex::restore(const v1::MethodState& message) {
   const v1::DeSimplexState& state = message.de_simplex();
-  polishing_ = state.polishing();
-  rounds_ = state.rounds();
+  LOAD_STATE(polishing, rounds)
   RETURN_IF_ERROR(differential_.restore(state.differential()));
   return simplex_.restore(state.simplex());
 }

@@ -173,7 +173,7 @@ const Individual& DifferentialEvolution::best() const {
 
 void DifferentialEvolution::save(v1::MethodState& message) const {
   v1::DifferentialEvolutionState& state = *message.mutable_differential_evolution();
-  state.set_iterations(iterations_);
+  SAVE_STATE(iterations, remembered)
   for (const Individual& individual : population_) {
     gapfarm::save(individual, *state.add_population());
   }
@@ -183,7 +183,6 @@ void DifferentialEvolution::save(v1::MethodState& message) const {
     state.add_memory(rates.weight);
     state.add_memory(rates.crossover);
   }
-  state.set_remembered(remembered_);
 }
 
 Status DifferentialEvolution::restore(const v1::MethodState& message) {
@@ -197,7 +196,7 @@ Status DifferentialEvolution::restore(const v1::MethodState& message) {
       (remembered != 0 && remembered != 2 * memory_.size())) {
     return damaged_method_state("differential evolution");
   }
-  iterations_ = state.iterations();
+  LOAD_STATE(iterations, remembered)
   population_.clear();
   for (const v1::Individual& saved : state.population()) {
     ASSIGN_OR_RETURN(Individual individual, load(saved, setup_.space));
@@ -214,7 +213,6 @@ Status DifferentialEvolution::restore(const v1::MethodState& message) {
     const int at = 2 * static_cast<int>(i);
     memory_[i] = {state.memory(at), state.memory(at + 1)};
   }
-  remembered_ = state.remembered();
   return {};
 }
 

@@ -229,11 +229,9 @@ std::vector<NamedNumber> LocalSearch::figures() const {
 
 void LocalSearch::save(v1::MethodState& message) const {
   v1::LocalSearchState& state = *message.mutable_local_search();
-  state.set_searches(searches_);
-  state.set_converged(converged_);
+  SAVE_STATE(searches, converged, best_cost)
   state.mutable_start()->Add(start_.begin(), start_.end());
   state.mutable_best()->Add(best_.begin(), best_.end());
-  state.set_best_cost(best_cost_);
   state.mutable_costs()->Add(costs_.begin(), costs_.end());
 }
 
@@ -244,11 +242,9 @@ Status LocalSearch::restore(const v1::MethodState& message) {
   if (!message.has_local_search() || !is_size(state.start_size()) || !is_size(state.best_size())) {
     return damaged_method_state("local search");
   }
-  searches_ = state.searches();
-  converged_ = state.converged();
+  LOAD_STATE(searches, converged, best_cost)
   start_.assign(state.start().begin(), state.start().end());
   best_.assign(state.best().begin(), state.best().end());
-  best_cost_ = state.best_cost();
   costs_.assign(state.costs().begin(), state.costs().end());
   return {};
 }
