@@ -101,7 +101,8 @@ std::string path_from(const std::string& folder, const std::string& path) {
   return !here && is_there(there) ? there.string() : path;
 }
 
-Status write_file_atomically(const std::string& given, std::string_view bytes, IfThere if_there) {
+Status write_file_atomically(const std::string& given, std::string_view bytes, IfThere if_there,
+                             unsigned mode) {
   std::error_code code;
   // Through a link, so that the link stays one.
   std::filesystem::path target(given);
@@ -134,7 +135,7 @@ Status write_file_atomically(const std::string& given, std::string_view bytes, I
   // mkstemp makes files for the owner alone; give what a plain open would have given.
   const mode_t mask = ::umask(0);
   ::umask(mask);
-  ::fchmod(fd, 0666 & ~mask);
+  ::fchmod(fd, mode & ~mask);
   ::close(fd);
   if (!written.ok()) {
     ::unlink(temporary.c_str());

@@ -34,8 +34,9 @@ enum class IfThere { kReplace, kKeep };
 
 // Writes beside `path` and renames, so a reader sees the old file or the new one, never a part.
 // Missing folders of `path` are made.  Links are followed; devices and pipes are written to.  What
-// a command is asked to write goes through its Outputs (master/cli), which come here.
+// a command is asked to write goes through its Outputs (master/cli), which come here.  `mode`: who
+// may read it, as far as the umask lets them; 0600: its owner alone.
 Status write_file_atomically(const std::string& path, std::string_view bytes,
-                             IfThere if_there = IfThere::kReplace);
+                             IfThere if_there = IfThere::kReplace, unsigned mode = 0666);
 
 }  // namespace gapfarm

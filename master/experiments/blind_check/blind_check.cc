@@ -40,6 +40,11 @@ Status check_fresh(const CheckPaths& paths) {
       "was asked, or another --out"};
 }
 
+// A file that only its owner can read.
+Status write_private_file(const std::string& path, std::string_view bytes) {
+  return write_file_atomically(path, bytes, IfThere::kReplace, 0600);
+}
+
 Status make_out(const std::string& out) {
   std::error_code code;
   fs::create_directories(out, code);

@@ -69,7 +69,7 @@ TEST(TruthBox, KeyReadsBack) {
 
 TEST(TruthBox, PrivateFilesAreTheOwnersAlone) {
   const TemporaryFolder folder;
-  ASSERT_TRUE(write_private_file(folder / "key", "secret").ok());
+  ASSERT_TRUE(write_file_atomically(folder / "key", "secret", IfThere::kReplace, 0600).ok());
   struct stat status = {};
   ASSERT_EQ(::stat((folder / "key").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777, 0600u);

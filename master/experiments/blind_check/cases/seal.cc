@@ -1,15 +1,10 @@
 #include "master/experiments/blind_check/cases/seal.h"
 
-#include <fcntl.h>
 #include <sodium.h>
 #include <sys/prctl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cassert>
-#include <cerrno>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -258,22 +253,6 @@ Result<std::vector<SealedTruth>> TruthKey::open_box(std::string_view box,
   }
   const Json json = parse_json(plain);
   return mapped(json, [](const Json& t) { return SealedTruth{t["id"], t["salt"], t["truth"]}; });
-}
-
-Status write_private_file(const std::string& path, std::string_view bytes) {
-  std::string temporary = path + ".XXXXXX";
-  const int fd = ::mkstemp(temporary.data());  // 0600
-  const auto failure = [&] { return Error{path + ": cannot be written: " + std::strerror(errno)}; };
-  if (fd < 0) return failure();
-  Status status;
-  const std::size_t size = bytes.size();
-  if (::write(fd, bytes.data(), size) != static_cast<ssize_t>(size) || ::fsync(fd) != 0) {
-    status = failure();
-  }
-  ::close(fd);
-  if (status && ::rename(temporary.c_str(), path.c_str()) != 0) status = failure();
-  if (!status) ::unlink(temporary.c_str());
-  return status;
 }
 
 PrivateMemory::PrivateMemory() : before_(::prctl(PR_GET_DUMPABLE)) { ::prctl(PR_SET_DUMPABLE, 0); }

@@ -95,9 +95,6 @@ class TruthKey {
   std::vector<unsigned char> bytes_;
 };
 
-// A file that only its owner can read, replaced whole.
-Status write_private_file(const std::string& path, std::string_view bytes);
-
 // While it lives, no other process of the user can read this one's memory through /proc or ptrace,
 // and it leaves no core.
 class PrivateMemory {
