@@ -66,7 +66,6 @@ class LongCommand {
   // For a study that knows its stages itself.
   StageHooks hooks();
 
-  bool begun() const { return !stage_.empty(); }  // a stage has
   bool keeps() const { return answers_ != nullptr; }
   AnswerStore& answers() { return *answers_; }  // REQUIRES: keeps()
   std::string how_to_go_on() const;

@@ -76,17 +76,9 @@ FarmOptions all_workers(const BlindCheckOptions& options) {
   return {.workers = static_cast<int>(diagnose.workers * diagnose.jobs)};
 }
 
-// What is being done, in the words of the check, as a stage of the whole.
-std::size_t stage_of(const std::string& what, std::size_t now) {
-  if (what == "strengths") return 0;
-  if (what == "sessions simulated") return now >= 2 ? 3 : 1;
-  return what == "cases diagnosed" ? 2 : 3;
-}
-
 Result<std::unique_ptr<Farm>> start(const BlindCheckOptions& options, const Config& config,
                                     CliContext& context) {
   ASSIGN_OR_RETURN(auto started, start_farm(all_workers(options), config.farm, context));
-  if (!context.work->begun()) context.work->stage(0);
   return context.work->over(std::move(started));
 }
 
@@ -96,12 +88,9 @@ BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
   hooks.stop = &context.stop;
   hooks.start_farm = [&options, &config, &context] { return start(options, config, context); };
   hooks.note = [&context](const std::string& sentence) { context.console.note(sentence); };
-  hooks.progress = [&context, stage = std::size_t{0}](const std::string& what, std::size_t done,
-                                                      std::size_t total) mutable {
-    const std::size_t k = stage_of(what, stage);
-    if (k != stage) context.work->stage(k);
-    stage = k;
-    context.work->advance(done, total);
+  hooks.stages = context.work->hooks();
+  hooks.diagnosed = [&context](std::size_t ended, std::size_t all) {
+    context.work->advance(ended, all);
   };
   hooks.on_sealed = [&context] {
     return context.work->keeps() ? context.work->answers().forget() : Status();
@@ -113,12 +102,12 @@ Result<int> show_strengths(const BlindCheckOptions& options, const Config& confi
                            const SessionPlans& plan, DesignSettings design, CliContext& context) {
   LongCommand::begin_if_possible("blind-check", KeepOption{}.place("blind-check", ""),
                                  {{"find strengths"}}, context);
+  context.work->stage(0);
   ASSIGN_OR_RETURN(const auto farm, start(options, config, context));
   ASSIGN_OR_RETURN(const auto planned, planned_problem(config, plan, config.seed, *farm));
   // The rest is made of the same effects and robots.
   design.nulls = design.pairs = design.excluded = 0;
-  const BlindCheckHooks hooks = hooks_of(options, config, context);
-  ASSIGN_OR_RETURN(const auto drawn, draw_design(planned, design, *farm, hooks.progress));
+  ASSIGN_OR_RETURN(const auto drawn, draw_design(planned, design, *farm));
   const std::size_t trials = planned.log.trials.size();
   const DesignSettings& asked = options.check.design;
   const std::string table = format_design(drawn, planned.table());

@@ -64,13 +64,14 @@ Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settin
                           const BlindCheckHooks& hooks, const CheckPaths& paths) {
   RETURN_IF_ERROR(check_fresh(paths));
   RETURN_IF_ERROR(make_out(paths.out));
+  hooks.stages.began(0);
   ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
   ASSIGN_OR_RETURN(const auto planned,
                    planned_problem(config, settings.plan, settings.design.seed, *farm));
-  ASSIGN_OR_RETURN(const auto design, draw_design(planned, settings.design, *farm, hooks.progress));
+  ASSIGN_OR_RETURN(const auto design, draw_design(planned, settings.design, *farm));
   if (design.cases.empty()) return Error{"the design holds no case; ask for effects or nulls"};
-  ASSIGN_OR_RETURN(const auto logs,
-                   simulate_cases(config, design.cases, settings.plan, 0, *farm, hooks.progress));
+  hooks.stages.began(1);
+  ASSIGN_OR_RETURN(const auto logs, simulate_cases(config, design.cases, settings.plan, 0, *farm));
   RETURN_IF_ERROR(write_cases(design.cases, logs, paths));
 
   InHand hand{TruthKey::random(), {}, design.out_of_reach};
@@ -156,9 +157,9 @@ Status add_realised(const Config& config, const BlindCheckSettings& settings,
     owner.push_back(i);
   }
   if (diagnosed.empty()) return {};
+  hooks.stages.began(3);
   ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
-  ASSIGN_OR_RETURN(const auto fresh,
-                   score_fresh_logs(config, diagnosed, settings.plan, *farm, hooks.progress));
+  ASSIGN_OR_RETURN(const auto fresh, score_fresh_logs(config, diagnosed, settings.plan, *farm));
   for (std::size_t i = 0; i < owner.size(); ++i) {
     if (!fresh[i]) continue;
     cases[owner[i]].fresh = fresh[i];

@@ -22,6 +22,7 @@
 
 #include "common/base/result.h"
 #include "common/process/stop.h"
+#include "common/progress/overall_progress.h"
 #include "master/diagnose/result/diagnosis.h"
 #include "master/experiments/blind_check/cases/design.h"
 #include "master/experiments/blind_check/tally.h"
@@ -32,7 +33,9 @@ namespace gapfarm {
 struct BlindCheckHooks {
   // Farm work comes in two stages, with the diagnoses between; the farm goes after each.
   std::function<Result<std::unique_ptr<Farm>>()> start_farm;
-  DesignProgress progress;
+  // Of find strengths, drive the cases, diagnose, judge; the farm's work shows how far it is.
+  StageHooks stages = {};
+  std::function<void(std::size_t ended, std::size_t all)> diagnosed;  // cases; may be empty
   std::function<void(const std::string& sentence)> note;
   // Before the first diagnosis, with the truths sealed: whatever else would reveal them has to go.
   // May be empty.

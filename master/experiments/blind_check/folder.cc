@@ -2,7 +2,6 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/resource.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -29,12 +28,11 @@ namespace gapfarm {
 namespace {
 
 constexpr double kGrace_s = 5;  // between asking and making a child end
-constexpr int kTick_ms = 250;
+constexpr int kTick_ms = 100;   // after which an end is seen
 
 struct Child {
   const ChildJob* job = nullptr;
   pid_t pid = 0;
-  int pidfd = -1;
   double started_s = 0;
   std::optional<double> asked_s;  // to end, beyond its limit
 };
@@ -49,12 +47,7 @@ Result<Child> start_job(const ChildJob& job) {
   const Result<pid_t> pid = start_child(setup);
   close(log);
   if (!pid) return Error{"cannot start " + job.argv[0] + ": " + pid.error().message};
-  Child child;
-  child.job = &job;
-  child.pid = *pid;
-  child.pidfd = static_cast<int>(syscall(SYS_pidfd_open, *pid, 0));
-  child.started_s = monotonic_seconds();
-  return child;
+  return Child{&job, *pid, monotonic_seconds(), {}};
 }
 
 double seconds_of(const timeval& time) {
@@ -90,26 +83,16 @@ class Crowd {
   ~Crowd() {
     for (const Child& child : children_) kill(-child.pid, SIGTERM);
     const double until = monotonic_seconds() + kGrace_s;
-    for (Child& child : children_) {
-      pollfd waiting = {child.pidfd, POLLIN, 0};
-      poll(&waiting, 1, static_cast<int>(1000 * std::max(0.0, until - monotonic_seconds())));
-      kill(-child.pid, SIGKILL);
-      waitpid(child.pid, nullptr, 0);
-      close(child.pidfd);
+    for (const Child& child : children_) {
+      int status = 0;
+      await_child(child.pid, until - monotonic_seconds(), &status);
+      kill(-child.pid, SIGKILL);  // what is left of it
     }
   }
   Crowd& operator=(Crowd&&) = delete;
 
   std::size_t size() const { return children_.size(); }
   void add(const Child& child) { children_.push_back(child); }
-
-  // Until a child ends, a stop is requested or a tick has passed.
-  void wait() const {
-    std::vector<pollfd> fds;
-    for (const Child& child : children_) fds.push_back({child.pidfd, POLLIN, 0});
-    if (options_.stop) fds.push_back({options_.stop->fd(), POLLIN, 0});
-    poll(fds.data(), fds.size(), kTick_ms);
-  }
 
   // Reports the children that ended; returns how many.
   std::size_t reap() {
@@ -123,8 +106,7 @@ class Crowd {
       }
       const Child child = children_[i];
       children_.erase(children_.begin() + static_cast<long>(i));
-      kill(-child.pid, SIGKILL);  // what is left of it
-      close(child.pidfd);
+      kill(-child.pid, SIGKILL);
       ++ended;
       const ChildEnd end = end_of(child, status, used, options_);
       if (options_.on_end) options_.on_end(*child.job, end);
@@ -167,7 +149,8 @@ Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& op
       crowd.add(child);
       ++started;
     }
-    crowd.wait();
+    pollfd stop = {options.stop ? options.stop->fd() : -1, POLLIN, 0};
+    poll(&stop, 1, kTick_ms);
     ended += crowd.reap();
     crowd.enforce_limit();
     if (options.on_tick) options.on_tick(ended);
@@ -259,6 +242,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
   if (jobs.size() < cases.size() && hooks.note) {
     hooks.note(std::to_string(cases.size() - jobs.size()) + " cases are diagnosed already");
   }
+  hooks.stages.began(2);
   Status written;
   ChildrenOptions options;
   options.at_once = settings.jobs;
@@ -273,7 +257,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
     }
   };
   options.on_tick = [&](std::size_t ended) {
-    if (hooks.progress) hooks.progress("cases diagnosed", ended, jobs.size());
+    if (hooks.diagnosed) hooks.diagnosed(ended, jobs.size());
   };
   RETURN_IF_ERROR(run_children(jobs, options));
   return written;

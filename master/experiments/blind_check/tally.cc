@@ -75,10 +75,10 @@ std::optional<DiagnosedCase> read_diagnosed_case(const Truth& truth, const std::
 
 Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     const Config& config, const std::vector<DiagnosedCase>& cases, const SessionPlans& plan,
-    Farm& farm, const DesignProgress& progress) {
+    Farm& farm) {
   const std::vector<Truth> truths = mapped(cases, &DiagnosedCase::truth);
   ASSIGN_OR_RETURN(std::vector<TrialLog> logs,
-                   simulate_cases(config, truths, plan, /*seed_offset=*/1, farm, progress));
+                   simulate_cases(config, truths, plan, /*seed_offset=*/1, farm));
   std::vector<std::optional<FreshScores>> scores;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     Problem problem = without_log(config.problem);
@@ -104,7 +104,6 @@ Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
                        predict_ends(corrected, {cases[i].final_}, farm, true));
       scores.back()->corrected = mean_log_score(with_residual.front());
     }
-    if (progress) progress("fresh logs predicted", i + 1, cases.size());
   }
   return scores;
 }

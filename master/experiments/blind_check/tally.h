@@ -190,7 +190,7 @@ std::optional<DiagnosedCase> read_diagnosed_case(const Truth& truth, const std::
 // farm's own.
 Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     const Config& config, const std::vector<DiagnosedCase>& cases, const SessionPlans& plan,
-    Farm& farm, const DesignProgress& progress = {});
+    Farm& farm);
 
 // The blind check's result for people and for programs.
 

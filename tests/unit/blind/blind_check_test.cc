@@ -166,8 +166,8 @@ TEST_F(BlindCheck, ACrashIsACountedOutcome) {
 
 TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
   fake_diagnose(with_verdict(Verdict::kNone));
-  hooks_.progress = [this](const std::string& what, std::size_t done, std::size_t) {
-    if (what == "cases diagnosed" && done == 2) stop_.request();
+  hooks_.diagnosed = [this](std::size_t done, std::size_t) {
+    if (done == 2) stop_.request();
   };
   const auto stopped = run();
   ASSERT_FALSE(stopped.ok());
@@ -180,7 +180,7 @@ TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
 
   StopSource fresh_stop;
   hooks_.stop = &fresh_stop;
-  hooks_.progress = nullptr;
+  hooks_.diagnosed = nullptr;
   settings_.resume = true;
   const auto resumed = run();
   ASSERT_TRUE(resumed.ok()) << resumed.error().message;

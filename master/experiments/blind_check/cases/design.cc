@@ -141,8 +141,7 @@ void record_size(const ParameterTable& table, const Arena& arena, const v1::Task
 }
 
 // All searches side by side, a round of farm work a step.
-Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
-                        const DesignProgress& progress) {
+Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm) {
   const ParameterTable& table = planned.table();
   const std::string hash = farm.add_problem(to_proto(planned));
   std::vector<v1::Task> tasks;
@@ -164,9 +163,6 @@ Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
       task.mutable_predict()->set_means_only(table.effects()[s.effect].moves_means());
       open.push_back(i);
       round.push_back(std::move(task));
-    }
-    if (progress) {
-      progress("strengths", drafts.sizings.size() - open.size(), drafts.sizings.size());
     }
     if (open.empty()) return {};
     ASSIGN_OR_RETURN(const auto results, farm.run(hash, round));
@@ -217,7 +213,7 @@ BlindDesign deal(const ParameterTable& table, const DesignSettings& settings, Dr
 
 Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::vector<Truth>& cases,
                                              const SessionPlans& plan, std::uint64_t seed_offset,
-                                             Farm& farm, const DesignProgress& progress) {
+                                             Farm& farm) {
   const Problem problem = without_log(config.problem);
   std::vector<v1::Task> tasks;
   std::vector<std::size_t> owner;
@@ -229,10 +225,7 @@ Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::ve
     tasks.insert(tasks.end(), sessions.begin(), sessions.end());
     owner.insert(owner.end(), sessions.size(), i);
   }
-  ASSIGN_OR_RETURN(const auto results,
-                   farm.run(farm.add_problem(to_proto(problem)), tasks, [&](const FarmProgress& p) {
-                     if (progress) progress("sessions simulated", p.done, p.total);
-                   }));
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
   std::vector<TrialLog> logs(cases.size());
   for (std::size_t i = 0; i < results.size(); ++i) {
     const v1::TaskResult& result = results[i];
@@ -269,13 +262,13 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
   return robot;
 }
 
-Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
-                                const DesignProgress& progress) {
+Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings,
+                                Farm& farm) {
   const ParameterTable& table = planned.table();
   ASSIGN_OR_RETURN(const auto effects, effects_named(table, settings.effects));
   Drafts drafts(planned, settings);
   draft_cases(settings, effects, drafts);
-  RETURN_IF_ERROR(search_strengths(planned, drafts, farm, progress));
+  RETURN_IF_ERROR(search_strengths(planned, drafts, farm));
   return deal(table, settings, std::move(drafts));
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -43,10 +42,6 @@ struct BlindDesign {
   std::vector<OutOfReach> out_of_reach;
 };
 
-// What is being done, and how much of it is done.
-using DesignProgress =
-    std::function<void(const std::string& what, std::size_t done, std::size_t total)>;
-
 // What a case's robot may differ by from the config's: each factor is log-uniform within
 // [1 / spread, spread].  Parameters that are genes of the config stay within the genes' ranges; in
 // a config with genes those that are not stay as they are, noise excepted.
@@ -58,8 +53,7 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
 // Draws robots and effects, and searches every strength on the farm, all cases side by side, on
 // the trials of `planned`: a log of the experiment with the config's own robot.
 // Errors: an unknown effect; the farm's own.
-Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
-                                const DesignProgress& progress = {});
+Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm);
 
 // What differs from the problem's values in a case.
 std::vector<v1::Override> overrides_of(const ParameterTable& table, const Truth& truth);
@@ -70,6 +64,6 @@ using SessionPlans = std::vector<std::vector<v1::PlannedTrial>>;
 // empty, its own plan.  Errors: a simulation that did not end well, by case; the farm's own.
 Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::vector<Truth>& cases,
                                              const SessionPlans& plan, std::uint64_t seed_offset,
-                                             Farm& farm, const DesignProgress& progress = {});
+                                             Farm& farm);
 
 }  // namespace gapfarm
