@@ -49,7 +49,7 @@ TEST(CliEffects, DrawsAPictureOfEach) {
   for (const Effect& effect : srv1_effects()) {
     const auto path = std::filesystem::path(pictures) / (effect.name + ".svg");
     ASSERT_TRUE(std::filesystem::exists(path)) << effect.name;
-    EXPECT_LT(std::filesystem::file_size(path), 15000u) << effect.name;
+    EXPECT_LT(std::filesystem::file_size(path), 25000u) << effect.name;
   }
   const Finished wrong = gapfarm_command({"effects", folder / "none.toml", "--figures", pictures});
   EXPECT_EQ(wrong.exit_code, 2);

@@ -37,16 +37,17 @@ LineChart floor_chart(const DriveReport& report) {
     chart.series.push_back(std::move(series));
   }
   if (!report.targets.empty()) {
-    ChartSeries targets{.name = "way-points", .dots = true};
-    for (const Eigen::Vector2d& t : report.targets) targets.line.push_back({t.x(), t.y()});
+    ChartSeries targets{.name = "way-points"};
+    for (const Eigen::Vector2d& t : report.targets) {
+      targets.marks.push_back({t.x(), t.y(), std::nan("")});
+    }
     chart.series.push_back(std::move(targets));
   }
   const DriverReport& first = report.drivers.front();
-  ChartSeries ends{.name = "ends of " + first.name, .dots = true};
-  for (const DrivenRun& run : first.runs) {
-    ends.line.push_back({run.back().path.back().pose.x, run.back().path.back().pose.y});
-  }
-  chart.series.push_back(std::move(ends));
+  chart.series.push_back(
+      {.name = "ends of " + first.name, .marks = mapped(first.runs, [](const DrivenRun& run) {
+                                          return run.back().path.back().pose;
+                                        })});
   return chart;
 }
 

@@ -20,7 +20,7 @@ LineChart floor_chart(const Problem& problem, const TrialLog& log) {
   chart.series = mapped(problem.commands, [](const CommandSpec& command) {
     return ChartSeries{.name = command.name, .arrows = true};
   });
-  ChartSeries put_down{.name = "the robot is put down", .dots = true};
+  ChartSeries put_down{.name = "the robot is put down"};
   const Trial* before = nullptr;
   for (const Trial& trial : log.trials) {
     ChartSeries* series = find_by(chart.series, trial.command, &ChartSeries::name);
@@ -28,7 +28,7 @@ LineChart floor_chart(const Problem& problem, const TrialLog& log) {
     series->line.insert(series->line.end(), {place_of(trial.X_WS), place_of(trial.X_WE)});
     const bool follows = before != nullptr && before->session == trial.session &&
                          before->X_WE.x == trial.X_WS.x && before->X_WE.y == trial.X_WS.y;
-    if (!follows) put_down.line.push_back(place_of(trial.X_WS));
+    if (!follows) put_down.marks.push_back(trial.X_WS);
     before = &trial;
   }
   chart.series.push_back(std::move(put_down));

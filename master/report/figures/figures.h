@@ -16,11 +16,15 @@
 namespace gapfarm {
 
 struct ChartSeries {
-  std::string name;
+  std::string name = {};                         // empty: not in the legend
   std::vector<SvgPoint> line = {};               // data units
   std::vector<SvgPoint> lower = {}, upper = {};  // ends of a band; empty: none
-  bool dots = false;                             // a dot a point in place of the line
   bool arrows = false;                           // from each second point to the next
+  std::vector<Pose> marks = {};  // each with a stroke along its heading, unless that is NaN
+  std::string colour = {};       // empty: by the place among the series
+  bool dashed = false;
+  bool filled = false;  // the line surrounds a faint area
+  bool scene = false;   // does not stretch the axes
 };
 
 struct ChartLevel {  // a horizontal line
@@ -30,18 +34,23 @@ struct ChartLevel {  // a horizontal line
 
 struct LineChart {
   std::string title, x_title, y_title;
+  std::string note;                  // below the title
+  double width = 860, height = 340;  // px, of the whole and of the plot
   bool log_x = false;
-  bool log_y = false;                     // points at or below 0 are omitted
-  bool equal_axes = false;                // one unit of x is as long as one of y
-  bool whole_x = false;                   // no ticks between integers
-  std::optional<double> y_least, y_most;  // what is beyond is cut off at the frame
+  bool log_y = false;       // points at or below 0 are omitted
+  bool equal_axes = false;  // one unit of x is as long as one of y
+  double least_span = 0;    // of equal axes
+  bool whole_x = false;     // no ticks between integers
+  // What is beyond is cut off at the frame; marks there are counted in the note.
+  std::optional<double> x_least, x_most, y_least, y_most;
   std::vector<ChartSeries> series;
   std::vector<ChartLevel> levels;
 };
 
 std::string line_chart(const LineChart& chart);
-// Several as one picture, so many in a row.
-std::string line_charts(const std::vector<LineChart>& charts, std::size_t across);
+// Several as one picture, so many in a row.  With a title above all, the legend stands there once.
+std::string line_charts(const std::vector<LineChart>& charts, std::size_t across,
+                        const std::string& title = "", const std::string& subtitle = "");
 
 struct ChartBar {
   std::string name;
@@ -67,15 +76,13 @@ struct PoseCloud {
 struct PosePanel {
   std::string title;
   std::vector<Pose> measured;
-  std::vector<PoseCloud> clouds;  // at most kPoseCloudStyles; the last one is drawn on top
+  std::vector<PoseCloud> clouds;  // the last one is drawn on top
 };
-
-inline constexpr std::size_t kPoseCloudStyles = 3;
 
 // One panel a command, three in a row: measured end poses as dots whose ticks point along their
 // heading; each cloud as a mark with its heading and the ellipse that holds 90 % of its positions.
 // Axes are equal and in mm.  A panel shows all clouds and the bulk of the measured poses; those
-// beyond it are counted in a corner.  Shapes and line styles differ as well as colours.
+// beyond it are counted.  Line styles differ as well as colours.
 std::string pose_picture(const std::vector<PosePanel>& panels, const std::string& title,
                          const std::string& subtitle = "");
 
@@ -104,8 +111,8 @@ struct EffectDrives {
   std::vector<LoggedDrive> with;  // more than one where chance has a say
 };
 
-// An SVG with a panel a command: the drive without the effect dashed with a hollow end, with it
-// solid with a filled one, each with a stroke along its heading, and by how much the end differs.
+// An SVG with a panel a command: the drive without the effect dashed, with it solid, each with a
+// stroke along the heading of its end, and by how much the end differs.
 // The drives are seen from X_WS, heading along the world's x.  Directions, discs, lines and centres
 // among the effect's `values` (in the catalogue's order) are drawn too, recognised by their
 // parameters' names: direction; x, y and radius; position and axis; x, y.

@@ -282,11 +282,8 @@ std::string fitness_chart(const RunReport& report) {
   chart.y_title = report.fitness + (report.unit == "-" ? "" : " (" + report.unit + ")") +
                   (report.higher_is_better ? ", higher is better" : ", lower is better");
   chart.whole_x = true;
-  ChartSeries best{.name = report.best_label() + ", and down to the worst",
-                   .line = {},
-                   .lower = {},
-                   .upper = {}};
-  ChartSeries median{.name = "median", .line = {}, .lower = {}, .upper = {}};
+  ChartSeries best{.name = report.best_label() + ", and down to the worst"};
+  ChartSeries median{.name = "median"};
   std::vector<double> medians;
   for (const RunGeneration& point : report.generations) {
     if (!point.best || !point.median || !point.worst) continue;

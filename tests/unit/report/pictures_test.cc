@@ -75,8 +75,8 @@ TEST(PosePicture, ShowsEveryPanelTrialAndCloud) {
   for (const PosePanel& panel : panels) EXPECT_THAT(svg, HasSubstr(">" + panel.title + "<"));
   EXPECT_THAT(svg, HasSubstr("before: nominal parameters, 90 % ellipse"));
   // Every trial is a dot or counted as beyond; the legend shows one more dot.
-  EXPECT_GE(count(svg, "<circle"), 6 * 57u + 1);
-  EXPECT_LE(count(svg, "<circle"), 6 * 60u + 1);
+  EXPECT_GE(count(svg, "r=\"2.3\""), 6 * 57u + 1);
+  EXPECT_LE(count(svg, "r=\"2.3\""), 6 * 60u + 1);
 }
 
 TEST(PosePicture, CountsWhatLiesFarAway) {
