@@ -175,6 +175,11 @@ Result<RunFront> run_front(const RunReader& reader,
   return front;
 }
 
+Json values_json(const StoredIndividual& member) {
+  Json values = parse_json(member.values);
+  return values.is_discarded() ? Json(nullptr) : values;
+}
+
 Json to_json(const RunFront& front) {
   Json objectives = Json::array(), members = Json::array(), volumes = Json::array();
   const auto at = [](const std::vector<double>& values, std::size_t m) {
@@ -193,7 +198,7 @@ Json to_json(const RunFront& front) {
     members.push_back({{"birth_id", member.birth_id},
                        {"objectives", std::move(values)},
                        {"fitness", number_or_null(member.fitness)},
-                       {"values", parse_json(member.values)}});
+                       {"values", values_json(member)}});
   }
   for (const std::optional<double>& volume : front.hypervolume) {
     volumes.push_back(number_or_null(volume));

@@ -348,9 +348,8 @@ Json to_json(const RunStatus& status) {
   json["heartbeat_age_s"] = status.heartbeat_age_s;
   if (!status.front.objectives.empty()) json["front"] = to_json(status.front);
   if (status.best_individual) {
-    const Json values = parse_json(status.best_individual->values);
     json["best"] = {{"birth_id", status.best_individual->birth_id},
-                    {"values", values.is_discarded() ? Json(nullptr) : values}};
+                    {"values", values_json(*status.best_individual)}};
   }
   return json;
 }

@@ -79,6 +79,8 @@ struct RunFront {
 };
 Result<RunFront> run_front(const RunReader& reader,
                            const std::vector<StoredGeneration>& generations);
+// A member's parameters; null where they were damaged.
+Json values_json(const StoredIndividual& member);
 Json to_json(const RunFront& front);
 
 struct RunStatus {

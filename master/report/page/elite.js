@@ -16,8 +16,8 @@ function startElite() {
     [...lines.entries()].reverse().forEach(([k, line]) => {
       const points = line.shares.map((share, i) => [share, row(i), { line, i, k }]);
       const look = k === 0 ? { style: "tuned", width: 2.6 } : { style: "final", width: 1.3, faint: 0.35 };
-      layers.push({ kind: "line", ...look, name: `genome ${line.id}`, points });
-      layers.push({ kind: "points", style: look.style, shape: "dot", faint: k === 0 ? 1 : 0.4, name: `genome ${line.id}`, points });
+      layers.push({ kind: "line", ...look, name: `genome ${line.birth_id}`, points });
+      layers.push({ kind: "points", style: look.style, shape: "dot", faint: k === 0 ? 1 : 0.4, name: `genome ${line.birth_id}`, points });
     });
     chart.show({
       x: { min: -0.02, max: 1.02, label: "of the range as it is searched", ticks: [[0, "least"], [0.5, "middle"], [1, "greatest"]] },
@@ -27,7 +27,7 @@ function startElite() {
       describe: ({ line, i, k }) => {
         const { key, unit, lower, upper } = axes[i];
         const fitness = withUnit(numberText(line.fitness, 6), PAGE.fitness.unit, " ");
-        return `${k === 0 ? "The best, genome" : "Genome"} ${line.id}, ${fitness}: ${key} ${withUnit(line.values[i], unit, " ")}, of ${lower} to ${upper}`;
+        return `${k === 0 ? "The best, genome" : "Genome"} ${line.birth_id}, ${fitness}: ${key} ${withUnit(line.values[i], unit, " ")}, of ${lower} to ${upper}`;
       },
     }, `The best ${lines.length} of the last generation`, `Orange and bold: the best. The ends of a row are the ends of what was searched.`, keep);
   }

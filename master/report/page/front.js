@@ -2,7 +2,9 @@
 // Of a run with several objectives: the front with its knee, and the hypervolume by generation.
 
 function frontSpec(x, y) {
-  const { objectives, members, knee } = PAGE.front;
+  const { objectives } = PAGE.front;
+  const members = PAGE.front.members.map((member) => ({ ...member, values: Object.values(member.objectives) }));
+  const knee = members.findIndex(({ birth_id }) => birth_id === PAGE.front.knee);
   const axis = (m) => {
     const range = extent(members.map(({ values }) => values[m]));
     return { ...roomy(...range, 0.06), label: `${objectives[m].name}, ${objectives[m].maximise ? "higher" : "lower"} is better` };
@@ -18,7 +20,7 @@ function frontSpec(x, y) {
       { kind: "points", style: "tuned", shape: "diamond", name: "knee", points: [marks[knee]] },
       { kind: "text", style: "tuned", text: "knee", points: [marks[knee].slice(0, 2)] },
     ],
-    describe: ({ member, k }) => `${k === knee ? "The knee, genome" : "Genome"} ${member.id}: ${objectives.map(({ name }, m) => `${name} ${numberText(member.values[m], 6)}`).join(", ")}`,
+    describe: ({ member, k }) => `${k === knee ? "The knee, genome" : "Genome"} ${member.birth_id}: ${objectives.map(({ name }, m) => `${name} ${numberText(member.values[m], 6)}`).join(", ")}`,
   };
 }
 
@@ -49,7 +51,7 @@ function startFront() {
         { kind: "points", style: "final", shape: "dot", faint: 0.3, name: "hypervolume", points: points.map(([g, v]) => [g, v, { g, v }]) },
       ],
       describe: ({ g, v }) => `generation ${g}: ${numberText(v, 6)}`,
-    }, "Hypervolume", `Within ${front.reference.map((r) => numberText(r, 4)).join(", ")}: the worst of the first generation.`, keep);
+    }, "Hypervolume", `Within ${front.objectives.map(({ reference }) => numberText(reference, 4)).join(", ")}: the worst of the first generation.`, keep);
   }
   drawLive(draw);
 }

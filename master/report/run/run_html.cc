@@ -58,46 +58,28 @@ std::string understanding_section(const RunReport& report) {
 }
 
 Json front_json(const RunReport& report) {
-  const RunFront& front = report.front;
-  Json objectives = Json::array(), members = Json::array(), volumes = Json::array();
-  for (const auto& [name, maximise] : front.objectives) {
-    objectives.push_back({{"name", name}, {"maximise", maximise}});
-  }
-  for (const StoredIndividual& member : front.members) {
-    members.push_back({{"id", member.birth_id}, {"values", written_values(member.objectives, 7)}});
-  }
   std::vector<std::pair<std::uint64_t, double>> known;
-  for (std::size_t i = 0; i < front.hypervolume.size(); ++i) {
-    if (front.hypervolume[i]) {
-      known.emplace_back(report.generations[i].generation, *front.hypervolume[i]);
+  for (std::size_t i = 0; i < report.front.hypervolume.size(); ++i) {
+    if (const auto& volume = report.front.hypervolume[i]) {
+      known.emplace_back(report.generations[i].generation, *volume);
     }
   }
-  for (const auto& [generation, volume] :
-       decimated(known, kMostVolumes, [](const auto& at) { return at.second; })) {
-    volumes.push_back({generation, rounded_to_digits(volume, 7)});
-  }
-  return {{"objectives", std::move(objectives)},
-          {"members", std::move(members)},
-          {"knee", front.knee},
-          {"reference", written(front.reference, 7)},
-          {"hypervolume", std::move(volumes)}};
+  Json front = to_json(report.front);
+  front["hypervolume"] = decimated(known, kMostVolumes, [](const auto& at) { return at.second; });
+  return rounded(std::move(front));
 }
 
 Json sample_json(const RunReport& report) {
-  Json genes = Json::array(), evaluated = Json::array();
-  for (const RunSample::GeneShare& gene : report.sample.genes) {
-    genes.push_back({{"key", gene.key},
-                     {"unit", gene.unit},
-                     {"lower", gene.lower},
-                     {"upper", gene.upper},
-                     {"log", gene.log},
-                     {"importance", written(gene.importance, 3)}});
-  }
+  Json evaluated = Json::array();
   for (const StoredIndividual& one : report.sample.evaluated) {
-    evaluated.push_back({one.birth_id, rounded_to_digits(*one.fitness, 6), written(one.genome, 3),
-                         written_values(one.objectives, 5)});
+    evaluated.push_back({one.birth_id, rounded_to_digits(*one.fitness, 6), rounded(one.genome, 3),
+                         rounded(mapped(one.objectives, &NamedValue::second), 5)});
   }
-  return {{"genes", std::move(genes)}, {"evaluated", std::move(evaluated)}};
+  return {{"genes", FieldWriter::list(report.sample.genes,
+                                      [](auto& v, auto& row) {
+                                        FIELDS(key, unit, lower, upper, log, importance);
+                                      })},
+          {"evaluated", std::move(evaluated)}};
 }
 
 constexpr int kVersion = 1;

@@ -5,6 +5,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/json/fields.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 #include "master/report/run/run_report.h"
@@ -13,25 +14,6 @@ namespace gapfarm {
 namespace {
 
 constexpr std::size_t kMostPoints = 2000;  // of a line: more than a screen can show
-
-std::string worker_table(const RunFarm& farm) {
-  if (farm.workers.empty()) return "<p>No worker has been heard of by this run's last master.</p>";
-  std::vector<HtmlRow> rows = mapped(farm.workers, [](const RunWorker& w) {
-    return HtmlRow{html_escaped(w.name),
-                   {html_escaped(w.host), html_escaped(w.state), std::to_string(w.jobs),
-                    number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s),
-                    w.failure.empty() ? "–" : html_escaped(w.failure)}};
-  });
-  return html_table("cards", "workers", "Workers",
-                    {{"worker"},
-                     {"host"},
-                     {"state"},
-                     {"jobs in hand", "number"},
-                     {"finished", "number"},
-                     {"jobs/s", "number"},
-                     {"last failure"}},
-                    rows);
-}
 
 std::string log_html(const std::vector<std::string>& lines) {
   if (lines.empty()) return "<p>It has no log.txt, or an empty one.</p>";
@@ -65,16 +47,30 @@ std::string timeline_html(const RunTimeline& timeline) {
 
 }  // namespace
 
-Json written(const std::optional<double>& value, int digits) {
-  return value ? Json(rounded_to_digits(*value, digits)) : Json(nullptr);
+std::string worker_table(const std::vector<RunWorker>& workers, const std::string& none) {
+  if (workers.empty()) return "<p>" + none + "</p>";
+  const std::vector<HtmlRow> rows = mapped(workers, [](const RunWorker& w) {
+    return HtmlRow{html_escaped(w.name),
+                   {html_escaped(w.host), html_escaped(w.state), std::to_string(w.jobs),
+                    number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s),
+                    w.failure.empty() ? "–" : html_escaped(w.failure)}};
+  });
+  return html_table("cards", "workers", "Workers",
+                    {{"worker"},
+                     {"host"},
+                     {"state"},
+                     {"jobs in hand", "number"},
+                     {"finished", "number"},
+                     {"jobs/s", "number"},
+                     {"last failure"}},
+                    rows);
 }
 
-Json written(const std::vector<double>& values, int digits) {
-  return mapped(values, [&](double value) { return rounded_to_digits(value, digits); });
-}
-
-Json written_values(const std::vector<NamedValue>& values, int digits) {
-  return written(mapped(values, &NamedValue::second), digits);
+Json rounded(Json json, int digits) {
+  if (json.is_number_float()) return rounded_to_digits(json.get<double>(), digits);
+  if (!json.is_structured()) return json;
+  for (Json& item : json) item = rounded(std::move(item), digits);
+  return json;
 }
 
 std::string state_line(const RunFarm& farm) {
@@ -193,57 +189,38 @@ std::string genomes_section(const RunReport& report) {
 }
 
 Json generations_json(const RunReport& report) {
-  Json list = Json::array();
   const auto best = [](const RunGeneration& g) { return g.best.value_or(0); };
-  for (const RunGeneration& g : decimated(report.generations, kMostPoints, best)) {
-    list.push_back({{"generation", g.generation},
-                    {"best", written(g.best)},
-                    {"median", written(g.median)},
-                    {"worst", written(g.worst)},
-                    {"evaluations", g.evaluations},
-                    {"wall_s", written(g.wall_s)}});
-  }
-  return list;
+  return rounded(FieldWriter::list(
+      decimated(report.generations, kMostPoints, best),
+      [](auto& v, auto& row) { FIELDS(generation, best, median, worst, evaluations, wall_s); }));
 }
 
 Json operators_json(const RunReport& report) {
-  const auto shares = [](const std::vector<double>& drawn) { return written(drawn); };
-  return {{"names", report.operators},
-          {"generations", report.probability_generations},
-          {"probabilities", mapped(report.probabilities, shares)}};
+  return rounded({{"names", report.operators},
+                  {"generations", report.probability_generations},
+                  {"probabilities", report.probabilities}});
 }
 
 Json elite_json(const RunReport& report) {
-  Json axes = Json::array(), lines = Json::array();
-  for (const auto& [key, unit, lower, upper] : report.elite.axes) {
-    axes.push_back({{"key", key}, {"unit", unit}, {"lower", lower}, {"upper", upper}});
-  }
-  for (const RunElite::Line& line : report.elite.lines) {
-    lines.push_back({{"id", line.birth_id},
-                     {"fitness", written(line.fitness)},
-                     {"shares", written(line.shares)},
-                     {"values", line.values}});
-  }
-  return {{"axes", std::move(axes)}, {"lines", std::move(lines)}};
+  constexpr auto kAxis = [](auto& v, auto& row) { FIELDS(key, unit, lower, upper); };
+  constexpr auto kLine = [](auto& v, auto& row) { FIELDS(birth_id, fitness, shares, values); };
+  return rounded({{"axes", FieldWriter::list(report.elite.axes, kAxis)},
+                  {"lines", FieldWriter::list(report.elite.lines, kLine)}});
 }
 
 Json densities_json(const RunReport& report) {
-  Json list = mapped(report.densities, [&](const GeneDensity& d) -> Json {
-    return {{"key", d.key},
-            {"unit", d.unit},
-            {"edges", written(d.edges)},
-            {"generations", d.generations},
-            {"counts", d.counts},
-            {"best", written(d.best)}};
-  });
-  return list;
+  return rounded(FieldWriter::list(report.densities, [](auto& v, auto& row) {
+    FIELDS(key, unit, edges, generations, counts, best);
+  }));
 }
 
 std::string farm_section(const RunFarm& farm) {
   if (farm.state.empty()) return "";
-  std::string html = R"(<div id="farm-now" data-live>)" + worker_table(farm) + "</div>" +
-                     timeline_html(farm.timeline) +
-                     R"(<div id="farm-past" data-live><h3>Workers that failed</h3>)";
+  std::string html =
+      R"(<div id="farm-now" data-live>)" +
+      worker_table(farm.workers, "No worker has been heard of by this run's last master.") +
+      "</div>" + timeline_html(farm.timeline) +
+      R"(<div id="farm-past" data-live><h3>Workers that failed</h3>)";
   html += farm.failures.empty() ? std::string("<p>None that this store reports.</p>")
                                 : html_list(farm.failures, "cautions");
   html += "<h3>What it coped with</h3>" + tally_html(farm);
@@ -257,24 +234,15 @@ std::string farm_section(const RunFarm& farm) {
 }
 
 Json timeline_json(const RunFarm& farm) {
-  const RunTimeline& t = farm.timeline;
-  Json counts = Json::array(), marks = Json::array(), spans = Json::array();
-  for (const auto& count : t.counts) counts.push_back({count.unix_s, count.workers});
-  for (const auto& mark : t.marks) {
-    marks.push_back(
-        {{"at", mark.unix_s}, {"workers", mark.workers}, {"kind", mark.kind}, {"text", mark.text}});
-  }
-  for (const auto& span : t.spans) {
-    spans.push_back({{"name", span.name},
-                     {"host", span.host},
-                     {"from", span.from_unix_s},
-                     {"to", span.to_unix_s},
-                     {"end", span.end}});
-  }
-  return {{"counts", std::move(counts)},
-          {"marks", std::move(marks)},
-          {"spans", std::move(spans)},
-          {"end", t.end_unix_s}};
+  constexpr auto kCount = [](auto& v, auto& row) { FIELDS(unix_s, workers); };
+  constexpr auto kMark = [](auto& v, auto& row) { FIELDS(unix_s, workers, kind, text); };
+  constexpr auto kSpan = [](auto& v, auto& row) {
+    FIELDS(name, host, from_unix_s, to_unix_s, end);
+  };
+  return {{"counts", FieldWriter::list(farm.timeline.counts, kCount)},
+          {"marks", FieldWriter::list(farm.timeline.marks, kMark)},
+          {"spans", FieldWriter::list(farm.timeline.spans, kSpan)},
+          {"end", farm.timeline.end_unix_s}};
 }
 
 }  // namespace gapfarm

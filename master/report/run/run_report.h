@@ -199,10 +199,11 @@ std::string fitness_chart(const RunReport& report);
 
 // What a run's page says of how it went on: operators, populations, genomes, the farm.
 
-// For plots: numbers with no more digits than these can show; null where there is none.
-Json written(const std::optional<double>& value, int digits = kPlotDigits);
-Json written(const std::vector<double>& values, int digits = kPlotDigits);
-Json written_values(const std::vector<NamedValue>& values, int digits);
+// All its numbers that are not whole with no more digits than plots can show.
+Json rounded(Json json, int digits = kPlotDigits);
+
+// `none`: a sentence where there are none.
+std::string worker_table(const std::vector<RunWorker>& workers, const std::string& none);
 
 // "running, 38.1 evaluations/s, about 3 min left", in a line of its own.
 std::string state_line(const RunFarm& farm);
