@@ -99,9 +99,10 @@ std::string p_text(double p) {
 
 std::string html_table(std::string_view css, std::string_view file, std::string_view caption,
                        const std::vector<HtmlColumn>& columns, const std::vector<HtmlRow>& rows) {
-  std::string html = fmt::format(
-      R"(<table class="{}" data-file="{}"><caption class="unseen">{}</caption><thead><tr>)", css,
-      html_escaped(file), html_escaped(caption));
+  std::string html =
+      fmt::format(R"(<table class="{}"{}><caption class="unseen">{}</caption><thead><tr>)", css,
+                  file.empty() ? "" : fmt::format(R"( data-file="{}")", html_escaped(file)),
+                  html_escaped(caption));
   for (const HtmlColumn& column : columns) {
     html += fmt::format(R"(<th scope="col"{}{}>{}</th>)",
                         column.css.rfind("number", 0) == 0 ? R"( class="number")" : "",

@@ -46,7 +46,8 @@ struct HtmlRow {
 };
 
 // `css`: "cards" becomes cards on a narrow screen, "parts" and "plain" do not.  `file`: what a copy
-// of the table is called; `caption` is for screen readers.  Heads and cells are HTML.
+// of the table is called, empty: none is offered; `caption` is for screen readers.  Heads and cells
+// are HTML.
 std::string html_table(std::string_view css, std::string_view file, std::string_view caption,
                        const std::vector<HtmlColumn>& columns, const std::vector<HtmlRow>& rows);
 

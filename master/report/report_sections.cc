@@ -59,22 +59,15 @@ std::string share_text(double share) {
 }
 
 std::string estimates(const NamedEffect& effect) {
-  std::string rows;
-  for (const Estimate& e : effect.parameters) {
-    rows += fmt::format(
-        R"(<tr><th scope="row"><code>{}</code></th><td class="number">{}</td><td class="number">{} to {}</td></tr>)",
-        html_escaped(e.key), html_escaped(with_unit(number_text(e.value), e.unit)),
-        number_text(e.lo), number_text(e.hi));
-  }
-  if (!effect.axis.empty()) {
-    rows += fmt::format(
-        R"(<tr><th scope="row"><code>axis</code></th><td class="number">{}</td><td></td></tr>)",
-        html_escaped(effect.axis));
-  }
+  std::vector<HtmlRow> rows = mapped(effect.parameters, [](const Estimate& e) {
+    return HtmlRow{"<code>" + html_escaped(e.key) + "</code>",
+                   {html_escaped(with_unit(number_text(e.value), e.unit)),
+                    number_text(e.lo) + " to " + number_text(e.hi)}};
+  });
+  if (!effect.axis.empty()) rows.push_back({"<code>axis</code>", {html_escaped(effect.axis), ""}});
   if (rows.empty()) return "";
-  return R"(<table class="plain"><thead><tr><th scope="col">parameter</th><th scope="col" class="number">estimate</th>)"
-         R"(<th scope="col" class="number">90 % interval</th></tr></thead><tbody>)" +
-         rows + "</tbody></table>";
+  return html_table("plain", "", "Estimates of " + effect.name,
+                    {{"parameter"}, {"estimate", "number"}, {"90 % interval", "number"}}, rows);
 }
 
 // "66 → 58.6 mm", or a dash where it was not measured.
@@ -291,17 +284,13 @@ std::string provenance_section(const Diagnosis& diagnosis) {
     if (std::isfinite(seconds)) total += seconds;
   }
   if (total > 0) {
-    html +=
-        R"(<h3>Time</h3><table class="plain timing"><caption class="unseen">Wall time by stage</caption>)"
-        R"(<thead><tr><th scope="col">stage</th><th scope="col">share</th><th scope="col" class="number">s</th></tr></thead><tbody>)";
-    for (const auto& [stage, seconds] : diagnosis.timing_s) {
-      html +=
-          fmt::format(R"(<tr><th scope="row">{}</th><td>{}</td><td class="number">{}</td></tr>)",
-                      html_escaped(stage), bar_svg(seconds / total, "fill"), number_text(seconds));
-    }
-    html += fmt::format(
-        R"(<tr class="sum"><th scope="row">in all</th><td></td><td class="number">{}</td></tr></tbody></table>)",
-        number_text(total));
+    std::vector<HtmlRow> rows = mapped(diagnosis.timing_s, [&](const auto& stage) {
+      return HtmlRow{html_escaped(stage.first),
+                     {bar_svg(stage.second / total, "fill"), number_text(stage.second)}};
+    });
+    rows.push_back({"in all", {"", number_text(total)}, "sum"});
+    html += "<h3>Time</h3>" + html_table("plain timing", "", "Wall time by stage",
+                                         {{"stage"}, {"share"}, {"s", "number"}}, rows);
   }
   return html_section("provenance", "What went in", html);
 }

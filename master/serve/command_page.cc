@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -125,22 +126,11 @@ std::string stages_section(const CommandRecord& r, const std::vector<AnsweredSta
 }
 
 std::string workers_section(const CommandRecord& r) {
-  std::vector<HtmlRow> rows;
-  for (const WorkerStatus& w : r.workers) {
-    rows.push_back({html_escaped(w.name),
-                    {html_escaped(w.host), html_escaped(w.state),
-                     number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s)}});
-  }
-  const std::string none = r.state == "running"
-                               ? "<p>No worker has been heard of.</p>"
-                               : "<p>The command has ended, and with it its workers.</p>";
+  const auto workers = mapped(r.workers, [](const WorkerStatus& w) { return RunWorker{w, ""}; });
   return R"(<section id="workers"><h2>Workers</h2><div id="worker-table" data-live>)" +
-         (rows.empty()
-              ? none
-              : html_table(
-                    "cards", "workers", "Workers",
-                    {{"worker"}, {"host"}, {"state"}, {"finished", "number"}, {"jobs/s", "number"}},
-                    rows)) +
+         worker_table(workers, r.state == "running"
+                                   ? "No worker has been heard of."
+                                   : "The command has ended, and with it its workers.") +
          "</div></section>\n";
 }
 

@@ -49,21 +49,19 @@ std::string timeline_html(const RunTimeline& timeline) {
 
 std::string worker_table(const std::vector<RunWorker>& workers, const std::string& none) {
   if (workers.empty()) return "<p>" + none + "</p>";
-  const std::vector<HtmlRow> rows = mapped(workers, [](const RunWorker& w) {
-    return HtmlRow{html_escaped(w.name),
-                   {html_escaped(w.host), html_escaped(w.state), std::to_string(w.jobs),
-                    number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s),
-                    w.failure.empty() ? "–" : html_escaped(w.failure)}};
+  std::vector<HtmlColumn> columns = {
+      {"worker"},          {"host"}, {"state"}, {"jobs in hand", "number"}, {"finished", "number"},
+      {"jobs/s", "number"}};
+  const bool failed = !std::ranges::all_of(workers, &std::string::empty, &RunWorker::failure);
+  if (failed) columns.push_back({"last failure"});
+  const std::vector<HtmlRow> rows = mapped(workers, [&](const RunWorker& w) {
+    HtmlRow row{html_escaped(w.name),
+                {html_escaped(w.host), html_escaped(w.state), std::to_string(w.jobs),
+                 number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s)}};
+    if (failed) row.cells.push_back(w.failure.empty() ? "–" : html_escaped(w.failure));
+    return row;
   });
-  return html_table("cards", "workers", "Workers",
-                    {{"worker"},
-                     {"host"},
-                     {"state"},
-                     {"jobs in hand", "number"},
-                     {"finished", "number"},
-                     {"jobs/s", "number"},
-                     {"last failure"}},
-                    rows);
+  return html_table("cards", "workers", "Workers", columns, rows);
 }
 
 Json rounded(Json json, int digits) {
