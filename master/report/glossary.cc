@@ -30,42 +30,30 @@ std::vector<Entry> read_entries() {
   return all;
 }
 
-const Entry* find(std::string_view id) {
+const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = read_entries();
-  return find_by(all, id, &Entry::id);
+  return all;
 }
+
+std::string link_to(std::string_view id) { return fmt::format(R"(href="#term-{}")", id); }
 
 }  // namespace
 
 std::string term(std::string_view id, std::string_view shown) {
-  assert(find(id) != nullptr);
-  return fmt::format(R"(<a class="term" href="#term-{}">{}</a>)", id, html_escaped(shown));
+  assert(contains(entries(), id, &Entry::id));
+  return fmt::format(R"(<a class="term" {}>{}</a>)", link_to(id), html_escaped(shown));
 }
 
-std::string glossary_section(const std::vector<std::string_view>& ids) {
-  std::string html = R"(<section id="words"><h2>Words</h2><dl class="glossary">)";
-  for (const std::string_view id : ids) {
-    const Entry* entry = find(id);
-    assert(entry != nullptr);
-    html += fmt::format(R"(<div id="term-{}"><dt>{}</dt><dd>{}</dd></div>)", id,
-                        html_escaped(entry->name), html_escaped(entry->text));
+std::string glossary_of(std::string_view page) {
+  std::string html;
+  for (const Entry& entry : entries()) {
+    if (page.find(link_to(entry.id)) == page.npos) continue;
+    html += fmt::format(R"(<div id="term-{}"><dt>{}</dt><dd>{}</dd></div>)", entry.id,
+                        html_escaped(entry.name), html_escaped(entry.text));
   }
-  return html + "</dl></section>\n";
-}
-
-const std::vector<std::string_view>& diagnosis_terms() {
-  static const std::vector<std::string_view> ids = {
-      "nat",   "gap",         "floor", "tuned",    "final",      "held-out", "interval",
-      "bound", "correlation", "rms",   "residual", "ellipse",    "trend",    "share",
-      "p",     "telling",     "gain",  "closed",   "confidence", "alias"};
-  return ids;
-}
-
-const std::vector<std::string_view>& run_terms() {
-  static const std::vector<std::string_view> ids = {
-      "nat",   "before",     "after",    "generation", "population", "operator",
-      "bound", "validation", "baseline", "rms",        "residual",   "ellipse"};
-  return ids;
+  if (html.empty()) return html;
+  return R"(<section id="words" data-live><h2>Words</h2><dl class="glossary">)" + html +
+         "</dl></section>\n";
 }
 
 }  // namespace gapfarm

@@ -80,11 +80,7 @@ std::string interval_svg(double value, double lo, double hi);
 // REQUIRES: the glossary has `id`.
 std::string term(std::string_view id, std::string_view shown);
 
-// The section with the explanations of `ids`, in this order; it prints, too.
-std::string glossary_section(const std::vector<std::string_view>& ids);
-
-// What the pages of a diagnosis and of a run explain.
-const std::vector<std::string_view>& diagnosis_terms();
-const std::vector<std::string_view>& run_terms();
+// The section that explains the words of this HTML; it prints, too.
+std::string glossary_of(std::string_view page);
 
 }  // namespace gapfarm

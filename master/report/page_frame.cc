@@ -187,7 +187,13 @@ std::string watch_section(std::string_view what) {
          kNoScript + "</section>\n";
 }
 
-std::string framed_page(const PageFrame& frame, const Json& page, const Json& trials) {
+Json no_plots() { return {{"models", Json::object()}, {"without_trials", ""}}; }
+
+Json no_trials() { return {{"columns", Json::array()}, {"rows", Json::array()}}; }
+
+std::string framed_page(PageFrame frame, Json page, const Json& trials) {
+  frame.add("words", "Words", glossary_of(frame.body));
+  page["served"] = frame.served;
   std::string html =
       head(frame) + "<body>\n" + kHatches + top(frame) + "<main>\n" + frame.body +
       (frame.served
@@ -204,6 +210,10 @@ std::string framed_page(const PageFrame& frame, const Json& page, const Json& tr
     html += fmt::format("<script>{}</script>\n", script);
   }
   return html + "</body>\n</html>\n";
+}
+
+std::string framed_page(PageFrame frame) {
+  return framed_page(std::move(frame), no_plots(), no_trials());
 }
 
 }  // namespace gapfarm

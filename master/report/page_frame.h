@@ -11,6 +11,10 @@
 
 namespace gapfarm {
 
+// The data of a page that has no plots, and of one without trials.
+Json no_plots();
+Json no_trials();
+
 struct PageFrame {
   std::string title;
   std::string brand;                                        // "diagnosis", "run"
@@ -23,8 +27,10 @@ struct PageFrame {
 };
 
 // One self-contained file, UTF-8: no network, its own scripts and styles only, named by their
-// hashes in its content security policy.  `page` and `trials` are the data of its plots.
-std::string framed_page(const PageFrame& frame, const Json& page, const Json& trials);
+// hashes in its content security policy.  `page` and `trials` are the data of its plots; its words
+// are explained at the end.
+std::string framed_page(PageFrame frame, Json page, const Json& trials);
+std::string framed_page(PageFrame frame);  // one without plots
 
 // Without scripts the plots have nothing to show; everything else is text.
 extern const char* const kNoScript;

@@ -242,7 +242,6 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
   Json page = summary_json(diagnosis);
   page["drives"] = drives_json(diagnosis.drives);
   page["models"] = {{"tuned", "tuned"}, {"final", "final"}};
-  page["served"] = served;
   page["without_trials"] = "This diagnosis was kept without its trials.";
   const Json trials = trials_json(diagnosis, kPlotDigits);
   if (diagnosis.verdict == Verdict::kUnusable) {
@@ -277,7 +276,6 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
   frame.add("next", "Next", next_section(diagnosis));
   frame.body += cautions_section(diagnosis);
   frame.add("provenance", "Inputs", provenance_section(diagnosis));
-  frame.add("words", "Words", glossary_section(diagnosis_terms()));
   return framed_page(frame, page, trials);
 }
 
@@ -317,8 +315,10 @@ std::string gap_split_html(const Diagnosis& diagnosis) {
     html += bars(splits.back());
   }
   return R"(<figure class="gap-split"><div class="splits">)" + html + "</div><figcaption>" +
-         "Before: the tuned base model. After: with the named effects. An effect's part is how "
-         "much the gap fell when it was added, in the order found, on " +
+         "Before: the tuned base model. After: the " + term("final", "final model") +
+         ", with the named effects. An effect's part is how much the gap fell when it was added, "
+         "in "
+         "the order found, on " +
          term("held-out", "trials that the fit did not see") +
          "; one that made it worse lengthens the bar after. The " + term("floor", "floor") +
          " is what repeating a trial in reality varies by; the log score is counted from it, in " +

@@ -88,9 +88,9 @@ std::string effect_card(const NamedEffect& effect, std::size_t number) {
   if (!effect.text.empty()) html += "<p>" + html_escaped(effect.text) + "</p>";
   html += fmt::format(
       R"(<div class="closed"><span class="closed-value">{} <strong>{}</strong> of the gap)"
-      R"(<small>90 % interval {} to {}</small></span>{}<span class="scale" aria-hidden="true"><span>0 %</span><span>50 %</span><span>100 %</span></span></div>)",
-      term("closed", "closes"), percent_text(effect.closed), percent_text(effect.closed_lo),
-      percent_text(effect.closed_hi),
+      R"(<small>{} {} to {}</small></span>{}<span class="scale" aria-hidden="true"><span>0 %</span><span>50 %</span><span>100 %</span></span></div>)",
+      term("closed", "closes"), percent_text(effect.closed), term("interval", "90 % interval"),
+      percent_text(effect.closed_lo), percent_text(effect.closed_hi),
       interval_svg(effect.closed, effect.closed_lo, effect.closed_hi));
   html += fmt::format(
       R"(<dl class="facts"><div><dt>gap, {}</dt><dd>{} → {} {}</dd></div><div><dt>{}</dt><dd>{}</dd></div>)"

@@ -146,7 +146,7 @@ std::string trouble_page(const std::string& what, const std::string& why) {
       R"(<section id="trouble"><h1 data-file="trouble">)" + html_escaped(what) +
       R"( cannot be shown</h1><p class="caution-box" id="why" data-live>)" + html_escaped(why) +
       R"(</p><p>Nothing was changed. This page takes its place as soon as it can be read; <a href="/">everything else</a> can be seen meanwhile.</p></section>)";
-  return framed_page(frame, plain_page_json(), no_trials_json());
+  return framed_page(std::move(frame));
 }
 
 Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
@@ -161,7 +161,6 @@ Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
   frame.places = {{"summary", "State"}};
   if (is_diagnosis) frame.places.emplace_back("found", "Found so far");
   frame.places.insert(frame.places.end(), {{"stages", "Simulations"}, {"workers", "Workers"}});
-  if (is_diagnosis) frame.places.emplace_back("words", "Words");
   const std::string message =
       r.state == "running" ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
   frame.body = fmt::format(
@@ -171,9 +170,7 @@ Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
       command_tiles(r));
   if (is_diagnosis) frame.body += found_section(r);
   frame.body += stages_section(r, stages) + workers_section(r);
-  if (is_diagnosis)
-    frame.body += glossary_section({"nat", "gap", "rms", "gain", "held-out", "alias"});
-  return framed_page(frame, plain_page_json(), no_trials_json());
+  return framed_page(std::move(frame));
 }
 
 }  // namespace gapfarm

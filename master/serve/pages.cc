@@ -217,9 +217,7 @@ std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
     frame.body += R"(<p>None of them fits the filter. <a href="/">Show all</a></p>)";
   }
   frame.body += R"(</div><button>Compare the ticked runs</button></form></section>)";
-  frame.places.emplace_back("words", "Words");
-  frame.body += glossary_section({"nat", "generation"});
-  return framed_page(frame, plain_page_json(), no_trials_json());
+  return framed_page(std::move(frame));
 }
 
 std::string compare_page(std::span<const RunReport> runs) {
@@ -227,8 +225,8 @@ std::string compare_page(std::span<const RunReport> runs) {
   frame.served = true;
   frame.title = fmt::format("gapfarm: {} runs", runs.size());
   frame.brand = "runs beside each other";
-  frame.places = {{"compared", "Fitness"}, {"sides", "Parameters"}, {"words", "Words"}};
-  Json page = plain_page_json();
+  frame.places = {{"compared", "Fitness"}, {"sides", "Parameters"}};
+  Json page = no_plots();
   page["fitness"] = {{"name", runs.front().fitness},
                      {"unit", runs.front().unit},
                      {"higher_is_better", runs.front().higher_is_better}};
@@ -256,18 +254,8 @@ std::string compare_page(std::span<const RunReport> runs) {
   frame.body += kNoScript;
   frame.body +=
       R"(</section><section id="sides"><h2>Parameters side by side</h2><div id="side-table" data-live>)" +
-      comparison_table(runs) + "</div></section>\n" +
-      glossary_section({"nat", "generation", "bound"});
-  return framed_page(frame, page, no_trials_json());
-}
-
-Json plain_page_json() {
-  return {{"models", Json::object()}, {"served", true}, {"without_trials", ""}};
-}
-
-Json no_trials_json() {
-  const auto none = Json::array();
-  return {{"columns", none}, {"rows", none}};
+      comparison_table(runs) + "</div></section>\n";
+  return framed_page(std::move(frame), std::move(page), no_trials());
 }
 
 namespace {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/json/json.h"
 #include "master/report/run/run_report.h"
 #include "master/serve/found.h"
 
@@ -33,9 +32,5 @@ std::string compare_page(std::span<const RunReport> runs);
 
 // Prometheus' text format.
 std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_s);
-
-// The data of a page that has no plots, and of one without trials.
-Json plain_page_json();
-Json no_trials_json();
 
 }  // namespace gapfarm

@@ -53,7 +53,6 @@ ALLOWED = [
     (r'master/report/page/(live|watch)\.js', r'told|said', 'data of the page'),
     (r'common/trials/.*|master/io/.*', r'words', 'words of a text'),
     (r'master/store/sql/.*', r'said', 'comments of tables on disk'),
-    (r'master/report/glossary\.txt', r'telling', 'an id in pages'),
     (r'tests/unit/store/command_record_test\.cc', r'telling', 'a telling word'),
 ]
 

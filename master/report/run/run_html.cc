@@ -205,7 +205,6 @@ Json page_json(const RunReport& report) {
                {"front", front_json(report)},
                {"sample", sample_json(report)},
                {"timeline", timeline_json(report.farm)},
-               {"served", report.served},
                {"run", report.name},
                {"windows", report.windows},
                {"logged_trials", report.trials},
@@ -325,7 +324,6 @@ std::string run_html(const RunReport& report) {
   frame.add("farm", "Farm", farm_section(report.farm));
   frame.add("provenance", "Inputs",
             html_section("provenance", "What went in", html_definitions(report.provenance)));
-  frame.add("words", "Words", glossary_section(run_terms()));
   Diagnosis table;
   if (report.outcome) table.trials = report.outcome->trials;
   return framed_page(frame, page_json(report), trials_json(table, kPlotDigits));
