@@ -2,8 +2,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <functional>
 
+#include "common/base/ranges.h"
 #include "master/experiments/influence/influence.h"
 #include "master/report/figures/figures.h"
 #include "master/report/html.h"
@@ -31,19 +31,35 @@ std::string toml_value(const ParameterTable& table, std::size_t row, double valu
   return table[row].kind == ParameterKind::kChoice ? '"' + text + '"' : text;
 }
 
-std::vector<ChartBar> bars_of(const InfluenceReport& report, const ParameterTable& table,
-                              Influence FactorInfluence::*method) {
-  std::vector<ChartBar> bars;
-  for (const FactorInfluence& factor : report.factors) {
+// The furthest on top.  What is beyond all bounds is omitted.
+LineChart distances_chart(const InfluenceReport& report, const ParameterTable& table,
+                          Influence FactorInfluence::*method, double repeats) {
+  constexpr double kMost_m = 1e5, kRow = 22;
+  LineChart chart;
+  std::vector<FactorInfluence> factors = report.factors;
+  std::ranges::stable_sort(
+      factors, {}, [&](const FactorInfluence& factor) { return (factor.*method).distance; });
+  for (const FactorInfluence& factor : factors) {
     const Influence& of = factor.*method;
-    if (of.distance >= 1e5) continue;  // no bar is that long
-    const bool known = std::isfinite(of.distance_95.lower);
-    bars.push_back({table[factor.gene.row].key, of.distance,
-                    known ? of.distance_95.lower : of.distance,
-                    known ? std::min(of.distance_95.upper, 1e5) : of.distance, of.influential});
+    if (of.distance >= kMost_m) continue;
+    const double y = static_cast<double>(chart.y_names.size());
+    chart.y_names.push_back(table[factor.gene.row].key);
+    const std::string name = of.influential ? "influential" : "not distinguished from repeats";
+    ChartSeries series{.marks = {{of.distance, y, NAN}},
+                       .colour = of.influential ? "#0072b2" : "#999999"};
+    if (!contains(chart.series, name, &ChartSeries::name)) series.name = name;
+    if (std::isfinite(of.distance_95.lower)) {
+      series.line = {{of.distance_95.lower, y}, {std::min(of.distance_95.upper, kMost_m), y}};
+    }
+    chart.series.push_back(std::move(series));
   }
-  std::ranges::stable_sort(bars, std::greater<>(), &ChartBar::value);
-  return bars;
+  const double rows = static_cast<double>(chart.y_names.size());
+  chart.height = kRow * (rows + 1);
+  chart.series.push_back({.name = "repeats",
+                          .line = {{repeats, -0.5}, {repeats, rows - 0.5}},
+                          .colour = "#d55e00",
+                          .dashed = true});
+  return chart;
 }
 
 }  // namespace
@@ -126,18 +142,19 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
     morris.push_back(row(f.morris, {distance_text(f.sigma)}));
   }
   page.heading("One parameter at a time");
-  page.picture(
-      bar_chart("Furthest level of each parameter", "m from the standard's path, median",
-                bars_of(report, table, &FactorInfluence::alone), report.repeat_distance, "repeats"),
-      "bars of distances, the influential ones filled");
+  LineChart distances =
+      distances_chart(report, table, &FactorInfluence::alone, report.repeat_distance);
+  distances.title = "Furthest level of each parameter";
+  distances.x_title = "m from the standard's path, median and 95 %";
+  page.picture(line_chart(distances), distances.title);
   page.table(
       {"parameter", "range", "furthest at", "m", "95 %", "p", "influential", "runs that failed"},
       alone);
   page.heading("Morris: one parameter a step, all over the box");
-  page.picture(bar_chart("Mean distance a step of two thirds of the range moves the path", "m",
-                         bars_of(report, table, &FactorInfluence::morris),
-                         report.box_repeat_distance, "repeats"),
-               "bars of mean distances, the influential ones filled");
+  distances = distances_chart(report, table, &FactorInfluence::morris, report.box_repeat_distance);
+  distances.title = "Mean distance a step of two thirds of the range moves the path";
+  distances.x_title = "m, mean and 95 %";
+  page.picture(line_chart(distances), distances.title);
   page.table({"parameter", "sigma, m", "mean, m", "95 %", "p", "influential", "runs that failed"},
              morris);
   return page.finish();

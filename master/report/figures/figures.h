@@ -34,6 +34,7 @@ struct ChartLevel {  // a horizontal line
 
 struct LineChart {
   std::string title, x_title, y_title;
+  std::vector<std::string> y_names;  // of y = 0, 1, ...; empty: numbers
   std::string note;                  // below the title
   double width = 860, height = 340;  // px, of the whole and of the plot
   bool log_x = false;
@@ -51,17 +52,6 @@ std::string line_chart(const LineChart& chart);
 // Several as one picture, so many in a row.  With a title above all, the legend stands there once.
 std::string line_charts(const std::vector<LineChart>& charts, std::size_t across,
                         const std::string& title = "", const std::string& subtitle = "");
-
-struct ChartBar {
-  std::string name;
-  double value = 0, lower = 0, upper = 0;
-  bool strong = false;  // filled; the others are outlined
-};
-
-// Horizontal bars from 0 with intervals, in the order given; `mark`: a vertical line.
-std::string bar_chart(const std::string& title, const std::string& x_title,
-                      const std::vector<ChartBar>& bars, std::optional<double> mark,
-                      const std::string& mark_name);
 
 // The picture of measured against simulated end poses (`poses.svg`).
 

@@ -56,10 +56,10 @@ struct Axis {
 
 struct Frame {
   Axis x = {}, y = {};
-  double width, height;
+  double left, width, height;
 
   SvgPoint at(double px, double py) const {
-    return {kPlotX + x.share(px) * width, kPlotY + height - y.share(py) * height};
+    return {left + x.share(px) * width, kPlotY + height - y.share(py) * height};
   }
   bool holds(const Pose& X) const {
     const double right = x.share(X.x), up = y.share(X.y);
@@ -77,7 +77,11 @@ std::vector<SvgPoint> places_of(const ChartSeries& series) {
 }
 
 Frame frame_of(const LineChart& chart) {
-  Frame frame{.width = chart.width - kPlotX - kRight, .height = chart.height};
+  double left = kPlotX;
+  for (const std::string& name : chart.y_names) {
+    left = std::max(left, 14 + kTextWidth * static_cast<double>(name.size()));
+  }
+  Frame frame{.left = left, .width = chart.width - left - kRight, .height = chart.height};
   frame.x.logarithmic = chart.log_x;
   frame.y.logarithmic = chart.log_y;
   bool first = true;
@@ -120,23 +124,30 @@ void draw_axes(Svg& svg, const Frame& frame, const LineChart& chart) {
   const SvgText middle{.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle};
   SvgText end = middle;
   end.anchor = SvgAnchor::kEnd;
-  const double bottom = kPlotY + frame.height, right = kPlotX + frame.width;
-  const auto ys = frame.y.ticks(static_cast<unsigned>(frame.height / 55));
+  const double bottom = kPlotY + frame.height, left = frame.left, right = left + frame.width;
+  auto ys = frame.y.ticks(static_cast<unsigned>(frame.height / 55));
+  if (!chart.y_names.empty()) {
+    ys =
+        mapped(indices(chart.y_names.size()), [](std::size_t k) { return static_cast<double>(k); });
+  }
   const auto xs = frame.x.ticks(std::max(4u, static_cast<unsigned>(frame.width / 94)));
   for (const double tick : ys) {
     const double y = bottom - frame.height * frame.y.share(tick);
     if (y < kPlotY || y > bottom) continue;
-    svg.line({kPlotX, y}, {right, y}, {.stroke = "#e9e9e9"});
-    svg.text({kPlotX - 7, y + 4}, frame.y.label(tick, ys), end);
+    svg.line({left, y}, {right, y}, {.stroke = "#e9e9e9"});
+    svg.text({left - 7, y + 4},
+             chart.y_names.empty() ? frame.y.label(tick, ys)
+                                   : chart.y_names[static_cast<std::size_t>(tick)],
+             end);
   }
   for (const double tick : xs) {
-    const double x = kPlotX + frame.width * frame.x.share(tick);
-    if (x < kPlotX || x > right || (chart.whole_x && tick != std::floor(tick))) continue;
+    const double x = left + frame.width * frame.x.share(tick);
+    if (x < left || x > right || (chart.whole_x && tick != std::floor(tick))) continue;
     svg.line({x, bottom}, {x, bottom + 5}, {.stroke = "#b5b5b5"});
     svg.text({x, bottom + 18}, frame.x.label(tick, xs), middle);
   }
-  svg.line({kPlotX, bottom}, {right, bottom}, {.stroke = "#b5b5b5"});
-  svg.text({(kPlotX + right) / 2, bottom + 38}, chart.x_title, middle);
+  svg.line({left, bottom}, {right, bottom}, {.stroke = "#b5b5b5"});
+  svg.text({(left + right) / 2, bottom + 38}, chart.x_title, middle);
   SvgText upright = middle;
   upright.rotation_deg = -90;
   svg.text({18, kPlotY + frame.height / 2}, chart.y_title, upright);
@@ -243,7 +254,7 @@ double height_of(const LineChart& chart, bool with_legend) {
 
 void draw_chart(Svg& svg, const LineChart& chart, bool with_legend) {
   const Frame frame = frame_of(chart);
-  const double right = kPlotX + frame.width;
+  const double right = frame.left + frame.width;
   std::size_t beyond = 0;
   for (const ChartSeries& series : chart.series) {
     beyond += static_cast<std::size_t>(
@@ -253,14 +264,14 @@ void draw_chart(Svg& svg, const LineChart& chart, bool with_legend) {
   svg.text({18, 30}, chart.title, {.size = 16, .bold = true});
   svg.text({18, 46}, chart.note + more, {.size = 11, .colour = kGrey});
   draw_axes(svg, frame, chart);
-  svg.begin_clip({kPlotX, kPlotY}, frame.width, frame.height);
+  svg.begin_clip({frame.left, kPlotY}, frame.width, frame.height);
   for (std::size_t i = 0; i < chart.series.size(); ++i) {
     draw_series(svg, frame, chart.series[i], i);
   }
   for (const ChartLevel& level : chart.levels) {
     if (!frame.y.shows(level.y)) continue;
     const double y = kPlotY + frame.height * (1 - frame.y.share(level.y));
-    svg.line({kPlotX, y}, {right, y}, kLevelStyle);
+    svg.line({frame.left, y}, {right, y}, kLevelStyle);
     if (y > kPlotY && y < kPlotY + frame.height) {
       svg.text({right - 4, y - 4}, level.name,
                {.size = 11, .colour = "#444444", .anchor = SvgAnchor::kEnd});
@@ -307,53 +318,5 @@ std::string line_charts(const std::vector<LineChart>& charts, std::size_t across
 }
 
 std::string line_chart(const LineChart& chart) { return line_charts({chart}, 1); }
-
-std::string bar_chart(const std::string& title, const std::string& x_title,
-                      const std::vector<ChartBar>& bars, std::optional<double> mark,
-                      const std::string& mark_name) {
-  constexpr double kWidth = 860, kNames = 230, kRow = 22;
-  Axis axis;
-  axis.include(0, true);
-  for (const ChartBar& bar : bars) axis.include(std::max(bar.value, bar.upper), false);
-  if (mark) axis.include(*mark, false);
-  axis.high += std::max(0.03 * (axis.high - axis.low), 1e-9);
-  const double width = kWidth - kNames - kRight;
-  const double height = kRow * static_cast<double>(bars.size());
-  Svg svg(kWidth, kPlotY + height + kAxis);
-  svg.text({18, 30}, title, {.size = 16, .bold = true});
-  const auto x_of = [&](double value) { return kNames + width * axis.share(value); };
-  const auto ticks = axis.ticks(7);
-  for (const double tick : ticks) {
-    svg.line({x_of(tick), kPlotY}, {x_of(tick), kPlotY + height}, {.stroke = "#e9e9e9"});
-    svg.text({x_of(tick), kPlotY + height + 18}, axis.label(tick, ticks),
-             {.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle});
-  }
-  for (std::size_t i = 0; i < bars.size(); ++i) {
-    const ChartBar& bar = bars[i];
-    const double y = kPlotY + kRow * (static_cast<double>(i) + 0.5);
-    svg.text({kNames - 8, y + 4}, bar.name, {.size = 12, .anchor = SvgAnchor::kEnd});
-    svg.rectangle({x_of(0), y - 7}, std::max(0.0, x_of(bar.value) - x_of(0)), 14,
-                  {.fill = bar.strong ? "#0072b2" : "#ffffff", .stroke = "#0072b2"});
-    if (bar.upper > bar.lower) {
-      svg.line({x_of(bar.lower), y}, {x_of(bar.upper), y},
-               {.stroke = "#000000", .stroke_width = 1.6});
-      for (const double end : {bar.lower, bar.upper}) {
-        svg.line({x_of(end), y - 4}, {x_of(end), y + 4},
-                 {.stroke = "#000000", .stroke_width = 1.6});
-      }
-    }
-  }
-  if (mark) {
-    svg.line({x_of(*mark), kPlotY - 6}, {x_of(*mark), kPlotY + height},
-             {.stroke = "#d55e00", .stroke_width = 1.6, .dash = "5 4"});
-    const bool left = axis.share(*mark) > 0.5;  // of its line, where there is room
-    svg.text(
-        {x_of(*mark) + (left ? -4 : 4), kPlotY - 6}, mark_name,
-        {.size = 11, .colour = "#d55e00", .anchor = left ? SvgAnchor::kEnd : SvgAnchor::kStart});
-  }
-  svg.text({kNames + width / 2, kPlotY + height + 40}, x_title,
-           {.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle});
-  return svg.finish();
-}
 
 }  // namespace gapfarm
