@@ -240,7 +240,10 @@ void draw_legend(Svg& svg, const LineChart& chart, SvgPoint corner, double width
     const SvgPoint p{corner.x + entry.place.x, corner.y + entry.place.y};
     const bool marks = entry.series != nullptr && !entry.series->marks.empty();
     if (!marks || !entry.series->line.empty()) svg.line(p, {p.x + 26, p.y}, entry.style);
-    if (marks) draw_mark(svg, {p.x + 13, p.y}, 0.5, *entry.series, entry.style);
+    if (marks) {
+      const double heading = std::isfinite(entry.series->marks.front().theta) ? 0.5 : NAN;
+      draw_mark(svg, {p.x + 13, p.y}, heading, *entry.series, entry.style);
+    }
     svg.text({p.x + 33, p.y + 4}, entry.name, {.size = 12});
   }
 }
