@@ -26,6 +26,16 @@ NestedFit nested_fit(const DiagnosisRequest& of, std::string name, JointFit fit,
   return nested;
 }
 
+// A base that was found beside effects holds them, too: these alone stay.
+Overrides beginning_with(const DiagnosisRequest& of, const std::vector<EffectCandidate>& effects,
+                         Overrides base) {
+  std::erase_if(base, [&](const auto& entry) {
+    const std::string& effect = of.table()[entry.first].effect;
+    return !effect.empty() && !contains(effects, effect, &EffectCandidate::effect);
+  });
+  return base;
+}
+
 // Base and these effects where the joint estimate has them, if there is one.
 void use_estimates(const DiagnosisRequest& of, const Explanation& named,
                    const std::vector<EffectCandidate>& effects, Overrides* start) {
@@ -65,7 +75,8 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
   for (std::size_t count = 0; count <= named.chosen.size(); ++count) {
     if (count > 0) effects.push_back(named.chosen[count - 1]);
     const bool alone = count == 0;
-    Overrides start = alone && !named.tuned_alone.empty() ? named.tuned_alone : study.base;
+    Overrides start = beginning_with(
+        of, effects, alone && !named.tuned_alone.empty() ? named.tuned_alone : study.base);
     if (!alone) use_estimates(of, named, effects, &start);
     const Study& fitted_in = alone ? study : beside;
     ASSIGN_OR_RETURN(auto fit,
