@@ -41,6 +41,20 @@ Problem pushed() {
   return problem;
 }
 
+// The same from other places of that side, of which the middle alone turns the piece the other way.
+Problem pushed_from(const std::function<double(int)>& aside_m) {
+  Problem problem = pushed();
+  for (Trial& t : problem.log.trials) {
+    const double aside = aside_m(t.trial);
+    t.X_WE = t.X_WS * Pose{0.05, 0, std::abs(aside) > 0.01 ? -1.5 : 1.2};
+    for (TipSample& tip : t.tip) {
+      tip.x -= aside * std::sin(t.X_WS.theta);
+      tip.y += aside * std::cos(t.X_WS.theta);
+    }
+  }
+  return problem;
+}
+
 std::string named(const Problem& problem) {
   std::vector<SanityFinding> findings;
   check_pushes(problem, &findings);
@@ -51,6 +65,14 @@ std::vector<std::size_t> impossible_trials(const Problem& problem) {
   std::vector<std::size_t> rows;
   check_sanity(problem, &rows);
   return rows;
+}
+
+TEST(PushChecks, PushesFromElsewhereEndElsewhere) {
+  const auto anywhere = [](int i) { return i == 7 ? 0 : i % 2 == 0 ? 0.045 : -0.025; };
+  EXPECT_EQ(impossible_trials(pushed_from(anywhere)), std::vector<std::size_t>());
+  // One push again and again has no reason to end there.
+  const auto same = [](int i) { return i == 7 ? 0 : 0.012; };
+  EXPECT_EQ(impossible_trials(pushed_from(same)), std::vector<std::size_t>{7});
 }
 
 TEST(PushChecks, LeaveOutPiecesThatTheTrackerHasLost) {
