@@ -96,10 +96,10 @@ const SpreadRow kSlipSpread = {
 
 extern const EffectDiagnosis kSlipEvents = {
     .effect = "slip_events",
-    .phrases = {"In %1 of the trials a side slips and loses up to %2 of its speed",
+    .phrases = {"Each side slips in %1 of the trials and loses up to %2 of its speed",
                 {{"probability", 100, " %"}, {"loss", 100, " %"}},
                 "Clean the treads and the floor",
-                "In %1 of the drives a side slips"},
+                "Each side slips in %1 of the drives"},
     .spread = &kSlipSpread,
     .found = "by the tails of what is left",
     .missing = "single drives are no outliers as slips would make them",

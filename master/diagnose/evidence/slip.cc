@@ -210,7 +210,8 @@ std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
     double nearest = squared;
     for (const Event& e : events) {
       const Eigen::Vector3d r = centred - e.left * t.left - e.right * t.right;
-      nearest = std::min(nearest, cov->squared_distance(r));
+      const bool one_side = e.left == 0 || e.right == 0;  // both at once are rare
+      if (one_side) nearest = std::min(nearest, cov->squared_distance(r));
       logs.push_back(std::log(e.weight) + log_predictive_density(r, *cov, outlier_share));
     }
     const double score = log_sum_exp(logs);

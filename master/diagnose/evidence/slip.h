@@ -28,7 +28,7 @@ struct SlipTrial {
   double score = 0;    // log predictive density, nats
   double slipped = 0;  // probability that a side did
   double squared = 0;  // squared distance from where it would end without, and
-  double nearest = 0;  // from the nearest place where it may end
+  double nearest = 0;  // from the nearest place where it ends if one side slips
 };
 // `mean_loss`: share of the sides' speed that the predictions of `residuals` lost to slips already.
 // As a worker scores a prediction with slips: every event of the mixture has the outliers' tail.

@@ -88,7 +88,7 @@ void emit_readings(const DiagnosisRequest& of, const Explanation& found) {
     finding.text += "Paths show motors that lag by " + three_digits(found.lag.tau_s) + " s. ";
   if (const FoundSpread* slips = found.spread("slip_events")) {
     finding.text +=
-        fmt::format("In {} % of the drives a side slips. ",
+        fmt::format("Each side slips in {} % of the drives. ",
                     plain_number(rounded_to_digits(100 * slips->fit.estimates[0].value, 2)));
   }
   if (!found.odd_drives.empty()) finding.text += found.odd_drives + " ";

@@ -128,6 +128,21 @@ TEST(TrialsWithSlips, ReportsSlipsFromOtherOutliers) {
   EXPECT_GE(others, 25U);
 }
 
+// Both sides at once slip once in forty drives where either slips in twenty: drives that go
+// straight but too short are something else.
+TEST(TrialsWithSlips, BothSidesAtOnceAreNoSlip) {
+  Drawn d = draw(2);
+  const SlipFit fit{.gain = 1, .probability = 0.05, .loss = 0.5, .noise = kTruth};
+  for (std::size_t i = 0; i < 60; ++i) {
+    d.residuals[i] -= 0.3 * (d.trials[i].left + d.trials[i].right);
+  }
+  const std::vector<SlipTrial> judged = trials_with_slips(d.trials, d.residuals, fit, 0, 0);
+  for (std::size_t i = 0; i < 60; ++i) {
+    if (judged[i].squared < 20) continue;
+    EXPECT_GT(judged[i].nearest, 11.5) << i;
+  }
+}
+
 TEST(TrialsWithSlips, ForeseenSlipsScoreHigher) {
   const Drawn d = draw(3, 0.1, 0.3);
   const SlipFit fit = fit_slip(d.trials, d.residuals, std::vector<bool>(600, true), kStart);
