@@ -82,6 +82,16 @@ bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value
   return at(value) <= at(row.lower) + near || at(value) >= at(row.upper) - near;
 }
 
+// Of what a perfect prediction would score, nats a trial.
+double gap_left(const Refit& refit) {
+  // Means alone predict no session's gain.
+  const auto& spreads = refit.judged.named.spreads;
+  const auto sessions = std::ranges::find_if(
+      spreads, [](const FoundSpread& s) { return s.row != nullptr && s.row->by_session; });
+  return refit.floor -
+         mean(sessions != spreads.end() ? sessions->scores : refit.nested.back().scores);
+}
+
 }  // namespace
 
 std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regression& explained) {
@@ -244,14 +254,22 @@ Judgement with_base_warning(const DiagnosisRequest& of, const Evidence& measured
   return with_warning(std::move(judged), on_bounds(of, measured.study));
 }
 
+Judgement beside_the_rest(const Refit& refit) {
+  Judgement judged = refit.judged;
+  const double left = gap_left(refit),
+               closed = refit.floor - mean(refit.nested.front().scores) - left;
+  if (judged.verdict != Verdict::kEffect || !(left > std::max(kMostOfNothing, closed)))
+    return judged;
+  judged.verdict = Verdict::kEffectAndUnknown;
+  judged.cautions.push_back("What is named leaves more of the gap than it closes: " +
+                            plain_number(rounded_to_digits(left, 3)) + " nats a trial.");
+  return judged;
+}
+
 std::optional<SanityFinding> missing_too_much(const Refit& refit) {
   const Judgement& judged = refit.judged;
-  // Means alone predict no session's gain.
   const auto& spreads = judged.named.spreads;
-  const auto sessions = std::ranges::find_if(
-      spreads, [](const FoundSpread& s) { return s.row != nullptr && s.row->by_session; });
-  const double gap =
-      refit.floor - mean(sessions != spreads.end() ? sessions->scores : refit.nested.back().scores);
+  const double gap = gap_left(refit);
   // A grid closes next to nothing.
   const bool names_more =
       !judged.named.chosen.empty() || spreads.size() > (judged.named.spread(kRounding) ? 1U : 0U);

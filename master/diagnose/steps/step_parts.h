@@ -78,6 +78,9 @@ Judgement judge_again(const Proposals& catalogue, Judgement judged);
 Explanation naming_nothing(Explanation explanation);
 // Why nothing is to be named where tuning ended on the edge of what the scenario can be.
 SanityFinding on_bounds(const DiagnosisRequest& of, const Study& tuned);
+// What is named explains not the whole where it leaves more than it closes, and more than sound
+// logs keep.
+Judgement beside_the_rest(const Refit& refit);
 // With its effects the model should predict about as well as its noise allows: why not to name any.
 std::optional<SanityFinding> missing_too_much(const Refit& refit);
 Judgement with_warning(Judgement judged, SanityFinding finding);

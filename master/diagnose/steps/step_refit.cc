@@ -239,6 +239,7 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   if (missing || (came_from_bounds(refit, measured) && !explains_bounds(refit))) {
     return naming_none(of, measured, std::move(refit), missing, folds);
   }
+  refit.judged = beside_the_rest(refit);
   return with_final_fit(of, std::move(refit));
 }
 
