@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "common/trials/read.h"
 #include "common/trials/write.h"
@@ -131,6 +133,23 @@ TEST_F(DiagnosePushes, AScaleIsNotNamedAnAspect) {
   ASSERT_EQ(d["effects"].size(), 1u) << d["headline"];
   EXPECT_EQ(d["effects"][0]["name"], "pose_scale");
   EXPECT_NEAR(d["effects"][0]["parameters"]["ratio"]["value"], 1.06, 0.005);
+}
+
+// Both are found, and neither may pass for the other where one alone is fitted.
+TEST_F(DiagnosePushes, NamesBothOfTwo) {
+  const Finished made = run_program(
+      "planar_push_log", {folder_.path().string(), "151", "table_tilt.angle=0.06",
+                          "table_tilt.direction=-2", "com_offset.x=-0.006", "com_offset.y=0.004"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const std::string config = shipped_config("push.toml", 60);
+  const Json d =
+      diagnose_log(folder_.write("c.toml", config), folder_ / "trials.csv", folder_ / "d",
+                   {"--exclude", "friction_anisotropy", "friction_speed", "friction_patch",
+                    "pressure_distribution", "finger_compliance", "placement_bias", "marker_offset",
+                    "camera_distortion", "camera_aspect", "pose_scale"});
+  std::set<std::string> names;
+  for (const Json& effect : d["effects"]) names.insert(effect["name"]);
+  EXPECT_EQ(names, (std::set<std::string>{"com_offset", "table_tilt"})) << d["headline"];
 }
 
 TEST_F(DiagnosePushes, OfAFewPushesNothingIsReported) {
