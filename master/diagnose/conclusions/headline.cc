@@ -46,7 +46,7 @@ std::string first_cause(const Diagnosis& d, const EffectDiagnoses& effects) {
   for (std::size_t i = 1; i < d.effects.size(); ++i) {
     others += (i > 1 ? ", " : "; also ") + d.effects[i].name;
   }
-  if (line.size() + others.size() > kLine) {
+  if (d.effects.size() > 1 && line.size() + others.size() > kLine) {
     const std::size_t more = d.effects.size() - 1;
     others = "; " + std::to_string(more) + (more == 1 ? " more cause" : " more causes");
   }
