@@ -164,8 +164,11 @@ std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at)
 
 Status tune_base(Predictor& predictor, bool keep, Study* study) {
   const Problem& problem = predictor.problem();
-  for (const BaseParameter& p : study->drive.tuned) study->base[p.row] = problem.values[p.row];
-  for (const std::size_t row : study->drive.kept) study->base[row] = problem.values[row];
+  const auto begin = [&](std::size_t row) {
+    if (!keep || !study->base.contains(row)) study->base[row] = problem.values[row];
+  };
+  for (const BaseParameter& p : study->drive.tuned) begin(p.row);
+  for (const std::size_t row : study->drive.kept) begin(row);
   if (!keep) {
     if (!study->drive.tuned.empty()) RETURN_IF_ERROR(fit_base(predictor, study));
     study->on_bounds = base_on_bounds(*study, study->base);

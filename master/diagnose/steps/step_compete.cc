@@ -350,6 +350,10 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
     study.use_noise(configured.noise);
   }
   const bool moves = of.subject.base_moves || (found.frees_base && found.tuned_alone.empty());
+  if (moves && !base_on_bounds(study, study.base).empty()) {
+    // From its bounds a base hardly comes back.
+    for (auto& [row, value] : study.base) value = of.problem.values[row];
+  }
   const Competition competition(of, study, evidence, found.first,
                                 moves ? BaseParameters::kFitted : BaseParameters::kHeld);
   Screening screening;

@@ -113,7 +113,10 @@ Result<Study> tune(const DiagnosisRequest& of) {
   // What draws a part of the base to its bounds may be that the rest is kept where it is.
   whole.drive.tuned = whole.base_parameters;
   const Status tuned = of.subject.tune(of.predictor, of.options.keep_base, &whole);
-  return tuned && whole.on_bounds.empty() ? std::move(whole) : std::move(*study);
+  if (tuned && whole.on_bounds.empty()) return whole;
+  // Or that what moves the robot is yet to be found: beside it the rest may move, too.
+  study->base_parameters = std::move(whole.base_parameters);
+  return study;
 }
 
 Evidence evidence_beside(Study study, Eigen::MatrixXd nuisances,

@@ -5,10 +5,12 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/laws.h"
+#include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/steps/watch.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -89,6 +91,26 @@ Result<Screening> look_for_session_gains_again(const DiagnosisRequest& of, Scree
 
 bool base_is_on_bounds(const Explanation& found) {
   return !base_on_bounds(found.study(), found.study().base).empty();
+}
+
+// Where there is nothing to explain, a base on its bounds misleads nobody: what trials do not show
+// of one another's sizes may lie anywhere.
+Result<std::optional<Screening>> nothing_to_explain(const DiagnosisRequest& of,
+                                                    const Explanation& nothing) {
+  Screening screening;
+  screening.found = look_for_spreads(of, nothing, nothing.evidence->base);
+  const Explanation& found = screening.found;
+  const Study& study = found.study();
+  const double share = of.outlier_share();
+  const double gap = floor_score(study, share) - mean(scores_of(study, study.residuals(), share));
+  if (found.names_anything() || !found.odd_drives.empty() || gap > kMostOfNothing) {
+    return std::optional<Screening>();
+  }
+  ASSIGN_OR_RETURN(screening.catalogue, marks_of(of, found));
+  const auto left = all_leftovers(found, explained_by(*screening.catalogue, found));
+  if (!left.empty() && left.front().log10_p < kUnknownLog10P) return std::optional<Screening>();
+  RETURN_IF_ERROR(screen_alone(of, found, &screening));
+  return std::optional(std::move(screening));
 }
 
 // What draws a base to its bounds is strong; beside it the base comes free, and hypotheses compete
@@ -244,9 +266,13 @@ Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, b
   const bool fell = !screening && screening.error().code == ErrorCode::kSimulation;
   if (fell ||
       (screening && (screening->found.chosen.empty() || base_is_on_bounds(screening->found)))) {
+    nothing.frees_base = false;
+    if (!fell && !screening->found.names_anything()) {
+      ASSIGN_OR_RETURN(auto sound, nothing_to_explain(of, nothing));
+      if (sound) return std::move(*sound);
+    }
     Screening none;
     none.found = std::move(nothing);
-    none.found.frees_base = false;
     none.warning = on_bounds(of, measured.study);
     return none;
   }

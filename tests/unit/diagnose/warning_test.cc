@@ -176,6 +176,24 @@ TEST(Diagnose, ABaseThatStaysOnItsBoundsIsQuestioned) {
   }
 }
 
+// Turns that the shortest treads of the table explain: nothing is left to be misled by.
+TEST(Diagnose, ABaseOnItsBoundsThatExplainsTheLogLacksNothing) {
+  Problem problem = kinematic_log(120);
+  const std::size_t length = row_of(Srv1::kContactLength);
+  const double gauge = problem.values[row_of(Srv1::kTrackGauge)];
+  const double turns =
+      (gauge + problem.values[length]) / (gauge + 1.099 * problem.table()[length].lower);
+  for (Trial& t : problem.log.trials) {
+    Twist motion = log(between(t.X_WS, t.X_WE));
+    motion[2] *= turns;
+    t.X_WE = t.X_WS * exp(motion);
+  }
+  KinematicFarm farm;
+  const auto result = diagnose(farm, problem, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_EQ(result->diagnosis.verdict, Verdict::kNone) << result->diagnosis.headline;
+}
+
 TEST(Diagnose, ReportsTheSameWhoeverWatches) {
   Problem problem = kinematic_log(120);
   for (Trial& t : problem.log.trials) {
@@ -230,6 +248,21 @@ TEST(Confidence, GrowsWithTheGainAndIsNeverSure) {
     last = confidence;
   }
   EXPECT_LT(sanity_confidence(), 0.998);
+}
+
+TEST(Headline, CountsTheCausesThatFindNoRoom) {
+  Problem pushes;
+  pushes.scenario = "push";
+  const EffectDiagnoses& effects = *diagnosis_subject(pushes)->effects;
+  Diagnosis d;
+  d.verdict = Verdict::kEffect;
+  NamedEffect& first = d.effects.emplace_back();
+  first.name = "pressure_distribution";
+  first.parameters = {{"stretch", 0.0646, 0.05, 0.08, "-"}, {"direction", 0.859, 0.8, 0.9, "rad"}};
+  EXPECT_EQ(headline(d, effects).find("more cause"), std::string::npos) << headline(d, effects);
+  d.effects.push_back(first);
+  EXPECT_NE(headline(d, effects).find("; 1 more cause."), std::string::npos)
+      << headline(d, effects);
 }
 
 TEST(Digits, SmallValuesDoNotVanish) {
