@@ -47,6 +47,19 @@ class DiagnosePushes : public ::testing::Test {
     return diagnosis;
   }
 
+  // Of the planar simulator, at half the rate of steps and without what is excluded: minutes less.
+  Json diagnose_planar(const char* seed, const std::vector<std::string>& set,
+                       const std::vector<std::string>& excluded) {
+    std::vector<std::string> make = {folder_.path().string(), seed};
+    make.insert(make.end(), set.begin(), set.end());
+    const Finished made = run_program("planar_push_log", make);
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    std::vector<std::string> more = {"--exclude"};
+    more.insert(more.end(), excluded.begin(), excluded.end());
+    return diagnose_log(folder_.write("c.toml", shipped_config("push.toml", 60)),
+                        folder_ / "trials.csv", folder_ / "d", more);
+  }
+
   TemporaryFolder folder_;
   std::string report_;
 };
@@ -100,17 +113,10 @@ TEST_F(DiagnosePushes, ReportNoneWhenNothingIsMissing) {
 // Seed 137 of scripts/foreign_pushes.sh: a disc of table seemed to explain more than the lens, but
 // predicted nothing.
 TEST_F(DiagnosePushes, WhatPredictsNothingKeepsNoOtherFromBeingFound) {
-  const Finished made =
-      run_program("planar_push_log", {folder_.path().string(), "137", "camera_distortion.k1=0.15",
-                                      "camera_distortion.x=0.5", "camera_distortion.y=0.5"});
-  ASSERT_EQ(made.exit_code, 0) << made.err;
-  // At half the rate of steps, and without all but the two: five minutes less.
-  const std::string config = shipped_config("push.toml", 60);
-  const Json d =
-      diagnose_log(folder_.write("c.toml", config), folder_ / "trials.csv", folder_ / "d",
-                   {"--exclude", "friction_anisotropy", "friction_speed", "table_tilt",
-                    "com_offset", "pressure_distribution", "finger_compliance", "placement_bias",
-                    "marker_offset", "camera_aspect"});
+  const Json d = diagnose_planar(
+      "137", {"camera_distortion.k1=0.15", "camera_distortion.x=0.5", "camera_distortion.y=0.5"},
+      {"friction_anisotropy", "friction_speed", "table_tilt", "com_offset", "pressure_distribution",
+       "finger_compliance", "placement_bias", "marker_offset", "camera_aspect"});
   EXPECT_EQ(d["verdict"], "effect") << d["headline"];
   ASSERT_EQ(d["effects"].size(), 1u);
   EXPECT_EQ(d["effects"][0]["name"], "camera_distortion");
@@ -121,15 +127,11 @@ TEST_F(DiagnosePushes, WhatPredictsNothingKeepsNoOtherFromBeingFound) {
 
 // The scale is free beside an aspect, which then does as well, here by half a nat better.
 TEST_F(DiagnosePushes, AScaleIsNotNamedAnAspect) {
-  const Finished made =
-      run_program("planar_push_log", {folder_.path().string(), "136", "pose_scale.ratio=1.06"});
-  ASSERT_EQ(made.exit_code, 0) << made.err;
-  const std::string config = shipped_config("push.toml", 60);
   const Json d =
-      diagnose_log(folder_.write("c.toml", config), folder_ / "trials.csv", folder_ / "d",
-                   {"--exclude", "friction_anisotropy", "friction_speed", "friction_patch",
-                    "table_tilt", "com_offset", "pressure_distribution", "finger_compliance",
-                    "placement_bias", "marker_offset", "camera_distortion"});
+      diagnose_planar("136", {"pose_scale.ratio=1.06"},
+                      {"friction_anisotropy", "friction_speed", "friction_patch", "table_tilt",
+                       "com_offset", "pressure_distribution", "finger_compliance", "placement_bias",
+                       "marker_offset", "camera_distortion"});
   ASSERT_EQ(d["effects"].size(), 1u) << d["headline"];
   EXPECT_EQ(d["effects"][0]["name"], "pose_scale");
   EXPECT_NEAR(d["effects"][0]["parameters"]["ratio"]["value"], 1.06, 0.005);
@@ -137,16 +139,13 @@ TEST_F(DiagnosePushes, AScaleIsNotNamedAnAspect) {
 
 // Both are found, and neither may pass for the other where one alone is fitted.
 TEST_F(DiagnosePushes, NamesBothOfTwo) {
-  const Finished made = run_program(
-      "planar_push_log", {folder_.path().string(), "151", "table_tilt.angle=0.06",
-                          "table_tilt.direction=-2", "com_offset.x=-0.006", "com_offset.y=0.004"});
-  ASSERT_EQ(made.exit_code, 0) << made.err;
-  const std::string config = shipped_config("push.toml", 60);
   const Json d =
-      diagnose_log(folder_.write("c.toml", config), folder_ / "trials.csv", folder_ / "d",
-                   {"--exclude", "friction_anisotropy", "friction_speed", "friction_patch",
-                    "pressure_distribution", "finger_compliance", "placement_bias", "marker_offset",
-                    "camera_distortion", "camera_aspect", "pose_scale"});
+      diagnose_planar("151",
+                      {"table_tilt.angle=0.06", "table_tilt.direction=-2", "com_offset.x=-0.006",
+                       "com_offset.y=0.004"},
+                      {"friction_anisotropy", "friction_speed", "friction_patch",
+                       "pressure_distribution", "finger_compliance", "placement_bias",
+                       "marker_offset", "camera_distortion", "camera_aspect", "pose_scale"});
   std::set<std::string> names;
   for (const Json& effect : d["effects"]) names.insert(effect["name"]);
   EXPECT_EQ(names, (std::set<std::string>{"com_offset", "table_tilt"})) << d["headline"];
