@@ -122,6 +122,8 @@ async function byKeys(address) {
   if (await tabTo(/canvas/)) {
     await page.key("ArrowRight");
     await until(page, `document.querySelector("#progress-plot .readout").textContent.includes("generation 1")`, "keys: a mark is read");
+    await page.run(`redraws.forEach((draw) => draw())`);
+    check(/generation 1,/.test(await page.run(`document.querySelector("#progress-plot .readout").textContent`)), "keys: what is new takes the mark from its reader");
     await page.key("+");
     await until(page, `document.querySelector("#progress-plot svg.chart text") !== null`, "keys: zoomed");
     check(await page.run(`getComputedStyle(document.activeElement).outlineStyle !== "none"`), "keys: nobody sees where the focus is");

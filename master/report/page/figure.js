@@ -128,6 +128,7 @@ class Chart {
     this.spec = fitted({ ...this.wanted, ...this.zoom }, this.width, height);
     this.canvas.style.height = `${height}px`;
     this.canvas.replaceChildren();
+    const read = this.readout.textContent;
     this.selected = null;
     this.map = drawPlot(this.canvas, this.spec, this.width, height);
     const all = this.spec.layers.filter((layer) => layer.kind === "points" || layer.kind === "arrows")
@@ -139,7 +140,8 @@ class Chart {
     this.note.textContent = this.noteText + beyond;
     const keys = "Arrow keys step through the marks, plus and minus zoom, 0 shows all.";
     this.canvas.ariaLabel = `${this.title.textContent}. ${this.note.textContent} ${keys}`;
-    this.select(null);
+    // New data, other colours and widths take no mark from its reader.
+    this.select((read && this.marks.find((mark) => this.spec.describe(mark[2]) === read)) || null);
   }
 
   // --- zoom ---
