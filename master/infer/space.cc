@@ -10,17 +10,17 @@ namespace {
 
 using Kind = Coordinate::Kind;
 
-double least_positive(const Parameter& row) {
-  return row.lower > 0 ? row.lower : kLeastShareOfRange * row.upper;
-}
-
 // Of a value that is searched as it is, or as its logarithm.
 double scaled(const Coordinate& c, const Parameter& row, double value) {
   const bool log = c.kind == Kind::kLogarithm;
-  return (log ? std::log(std::max(value, least_positive(row))) : value) / c.size;
+  return (log ? std::log(positive(row, value)) : value) / c.size;
 }
 
 }  // namespace
+
+double positive(const Parameter& row, double value) {
+  return std::max(value, row.lower > 0 ? row.lower : kLeastShareOfRange * row.upper);
+}
 
 std::vector<Coordinate> columns(Eigen::Index count) {
   std::vector<Coordinate> all(static_cast<std::size_t>(count));

@@ -34,6 +34,9 @@ struct Coordinate {
   Eigen::Index dimensions() const { return kind == Kind::kPolar ? 2 : 1; }
 };
 
+// No less than the least that has a logarithm.
+double positive(const Parameter& row, double value);
+
 // That many columns, from the first on.
 std::vector<Coordinate> columns(Eigen::Index count);
 

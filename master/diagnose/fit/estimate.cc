@@ -17,10 +17,37 @@
 namespace gapfarm {
 namespace {
 
-// Of a parameter's range: one unit of its coordinate.
-constexpr double kUnitOfRange = 0.1;
+// One unit of a coordinate: of a parameter's range, or of its logarithm.
+constexpr double kUnit = 0.1;
 
-double unit_of(const Parameter& row) { return kUnitOfRange * (row.upper - row.lower); }
+// Of the fit's parameter `k`, whose valleys run along products and quotients: a nap drags as far
+// where the floor grips as much better.
+infer::Coordinate coordinate_of(const Study& study, const JointFit& fit, std::size_t k) {
+  using Kind = infer::Coordinate::Kind;
+  const bool base = k < fit.base_parameters;
+  infer::Coordinate c;
+  c.row = fit.parameters[k].row;
+  const Parameter& row = (*study.table)[c.row];
+  const bool turns = row.key.ends_with(".direction");
+  c.kind = turns ? Kind::kAngle : row.lower >= 0 || base ? Kind::kLogarithm : Kind::kLinear;
+  c.size = c.kind == Kind::kLogarithm ? kUnit : kUnit * (row.upper - row.lower);
+  if (base) {
+    c.prior_sd = study.base_parameters[k].prior_log_sd / c.size;
+    c.centre = std::log(study.base.at(c.row)) / c.size;
+  }
+  return c;
+}
+
+// What a unit of each coordinate is in the parameters' own, at these values.
+Eigen::VectorXd units_of(const Study& study, const JointFit& fit) {
+  Eigen::VectorXd units(static_cast<Eigen::Index>(fit.parameters.size()));
+  for (Eigen::Index k = 0; k < units.size(); ++k) {
+    const infer::Coordinate c = coordinate_of(study, fit, static_cast<std::size_t>(k));
+    const bool log = c.kind == infer::Coordinate::Kind::kLogarithm;
+    units[k] = log ? c.size * infer::positive((*study.table)[c.row], fit.at.at(c.row)) : c.size;
+  }
+  return units;
+}
 
 // Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
 // catalogue's bounds make a small change.
@@ -78,10 +105,11 @@ void take(const Study& study, const infer::Fitter& fitter, const infer::Fit& fou
   const Eigen::Index before = found.u.size() - static_cast<Eigen::Index>(fit->parameters.size());
   const Eigen::MatrixXd inverse = inverse_of_symmetric(fitter.normal(found).matrix);
   fit->jacobian.resize(found.z.size(), static_cast<Eigen::Index>(fit->parameters.size()));
+  const Eigen::VectorXd units = units_of(study, *fit);
   for (std::size_t k = 0; k < fit->parameters.size(); ++k) {
     FittedParameter& p = fit->parameters[k];
     const Eigen::Index at = before + static_cast<Eigen::Index>(k);
-    const double unit = unit_of((*study.table)[p.row]);
+    const double unit = units[static_cast<Eigen::Index>(k)];
     p.value = fit->at.at(p.row);
     p.standard_error = unit * std::sqrt(std::max(0.0, inverse(at, at)));
     fit->jacobian.col(static_cast<Eigen::Index>(k)) = -found.slopes.col(at) / unit;
@@ -102,8 +130,8 @@ Eigen::MatrixXd information_of(const Study& study, const JointFit& fit,
   study.drop_ignored(slopes);
   Eigen::MatrixXd information = infer::information(slopes, nuisances);
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const double sd = prior_sd(study, study.base_parameters[k]);
-    information(k, k) += 1 / (sd * sd);
+    const BaseParameter& p = study.base_parameters[k];
+    information(k, k) += 1 / std::pow(p.prior_log_sd * fit.at.at(p.row), 2);
   }
   return information;
 }
@@ -126,14 +154,7 @@ infer::Observations observations_of(const Study& study, const Eigen::MatrixXd& n
 infer::Space space_of(const Study& study, const JointFit& fit, Eigen::Index nuisances) {
   std::vector<infer::Coordinate> all = infer::columns(nuisances);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
-    const std::size_t row = fit.parameters[k].row;
-    infer::Coordinate& c = all.emplace_back();
-    c.row = row;
-    c.size = unit_of((*study.table)[row]);
-    if ((*study.table)[row].key.ends_with(".direction")) c.kind = infer::Coordinate::Kind::kAngle;
-    if (k >= fit.base_parameters) continue;
-    c.prior_sd = prior_sd(study, study.base_parameters[k]) / c.size;
-    c.centre = study.base.at(row) / c.size;
+    all.push_back(coordinate_of(study, fit, k));
   }
   return {*study.table, std::move(all), fit.at};
 }
@@ -141,9 +162,7 @@ infer::Space space_of(const Study& study, const JointFit& fit, Eigen::Index nuis
 infer::Fit as_searched(const Study& study, const JointFit& fit, const infer::Fitter& fitter,
                        const infer::Space& space) {
   infer::Fit searched = fitter.known(space.from(fit.at), study.whiten(fit.residuals));
-  const Eigen::VectorXd units = vector_of(
-      fit.parameters, [&](const FittedParameter& p) { return unit_of((*study.table)[p.row]); });
-  searched.slopes = -fit.jacobian * units.asDiagonal();
+  searched.slopes = -fit.jacobian * units_of(study, fit).asDiagonal();
   return searched;
 }
 
@@ -215,11 +234,11 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   u.head(nuisances.cols()) = beside_nuisances(study, fit, observations).u;
   ASSIGN_OR_RETURN(auto found, fitter.start(u));
   found.differences = Eigen::VectorXd::Ones(u.size());
+  const Eigen::VectorXd units = units_of(study, fit);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
     const FittedParameter& p = fit.parameters[k];
-    const Parameter& row = (*study.table)[p.row];
-    found.differences[nuisances.cols() + static_cast<Eigen::Index>(k)] =
-        step_of(row, p.value) / unit_of(row);
+    const auto at = static_cast<Eigen::Index>(k);
+    found.differences[nuisances.cols() + at] = step_of((*study.table)[p.row], p.value) / units[at];
   }
   RETURN_IF_ERROR(fitter.improve(&found, rounds));
   if (found.slopes.size() == 0) RETURN_IF_ERROR(fitter.differentiate(&found));

@@ -5,8 +5,10 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <string>
 #include <utility>
 
 #include "master/diagnose/study.h"
@@ -18,11 +20,14 @@ namespace {
 
 constexpr double kNoise_m = 1e-3;
 
-// Ends at x and y that are functions of where a centre of mass is said to be.
+// Ends at x and y that are functions of two parameters: of where a centre of mass is said to be, or
+// others.
+using Keys = std::array<std::string, 2>;
 class Curve : public AnsweringFarm {
  public:
   using Place = std::function<Eigen::Vector2d(double x, double y)>;
-  explicit Curve(Place place) : place_(std::move(place)) {}
+  explicit Curve(Place place, Keys keys = {"com_offset.x", "com_offset.y"})
+      : place_(std::move(place)), keys_(std::move(keys)) {}
 
  private:
   v1::TaskResult answer(const Problem& problem, const v1::Task& task) const override {
@@ -31,8 +36,7 @@ class Curve : public AnsweringFarm {
       values[o.parameter()] = o.value();
     }
     const ParameterTable& table = problem.table();
-    const Eigen::Vector2d at =
-        place_(values[table.row("com_offset.x")], values[table.row("com_offset.y")]);
+    const Eigen::Vector2d at = place_(values[table.row(keys_[0])], values[table.row(keys_[1])]);
     v1::TaskResult result;
     result.set_outcome(v1::OK);
     const auto& wanted = task.predict().trials();
@@ -46,6 +50,7 @@ class Curve : public AnsweringFarm {
   }
 
   Place place_;
+  Keys keys_;
 };
 
 Problem lone_trial() {
@@ -96,6 +101,36 @@ TEST(Profile, WidensNothingOfAStraightLine) {
     EXPECT_NEAR(f.after.parameters[k].bent, 1, 1e-3);
     EXPECT_NEAR(f.after.parameters[k].standard_error, kNoise_m / std::sqrt(2), 1e-6);
   }
+}
+
+// A drag over a friction: in logarithms its valley is straight, and the friction's prior decides.
+TEST(Profile, WidensNothingOfAQuotient) {
+  Curve farm([](double drag, double friction) { return Eigen::Vector2d(drag / friction, 0); },
+             {"rolling_resistance.coefficient", "friction"});
+  const Problem problem = lone_trial();
+  Predictor predictor(farm, problem);
+  const ParameterTable& table = problem.table();
+  const std::size_t drag = table.row("rolling_resistance.coefficient"),
+                    friction = table.row("friction");
+  Study study;
+  study.subject = diagnosis_subject(problem);
+  study.table = &table;
+  study.trials.resize(1);
+  study.trials[0].X_WE = {0.5, 0, 0};
+  study.whitener.assign(1, Eigen::Matrix3d::Identity() / kNoise_m);
+  study.base = {{friction, 0.4}};
+  study.base_parameters = {{friction, 0.3}};
+  EffectCandidate effect;
+  effect.signature.effect = "rolling_resistance";
+  const auto fit = fit_jointly(predictor, study, {effect}, {{drag, 0.1}, {friction, 0.4}},
+                               BaseParameters::kFitted, Eigen::MatrixXd(3, 0), 8);
+  ASSERT_TRUE(fit.ok()) << fit.error().message;
+  const auto looked = profiled(predictor, study, {effect}, *fit);
+  ASSERT_TRUE(looked.ok()) << looked.error().message;
+  const FittedParameter &found = looked->parameters[1], &beside = looked->parameters[0];
+  EXPECT_NEAR(found.value / beside.value, 0.5, 1e-3);
+  EXPECT_NEAR(found.standard_error / found.value, std::hypot(0.3, kNoise_m / 0.5), 0.01);
+  EXPECT_NEAR(found.bent, 1, 1e-3);
 }
 
 // Two standard errors of the slopes to either side a saturating end has moved by tanh(2).
