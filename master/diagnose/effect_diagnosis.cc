@@ -3,14 +3,24 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/laws.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
 
-double model_error(const EffectDiagnosis& effect, const Parameter& p, double value) {
-  return p.key.ends_with(".direction") ? effect.direction_error_rad
-                                       : effect.model_error * (value - p.nominal);
+// A size is off by a factor: whatever it is, an effect that is there keeps its sign.
+IntervalSides model_error(const EffectDiagnosis& effect, const Parameter& p, double value) {
+  if (p.key.ends_with(".direction")) {
+    return {kNormal90 * effect.direction_error_rad, kNormal90 * effect.direction_error_rad};
+  }
+  const auto own = std::ranges::find_if(effect.searched, [&](const SearchedSize& size) {
+    return size.model_error > 0 && p.key == p.effect + "." + size.key;
+  });
+  const double error = own == effect.searched.end() ? effect.model_error : own->model_error;
+  const double size = value - p.nominal, factor = std::pow(1 + error, kNormal90);
+  const IntervalSides grown = {std::abs(size) * (1 - 1 / factor), std::abs(size) * (factor - 1)};
+  return size < 0 ? IntervalSides{grown.above, grown.below} : grown;
 }
 
 }  // namespace
@@ -71,14 +81,16 @@ void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string
   (*values)[polar.direction] = std::atan2(c[1], c[0]) / polar.symmetry;
 }
 
-double error_beyond_fit(const Study& study, const ParameterTable& table, std::size_t row,
-                        const Overrides& at, double gain) {
+IntervalSides interval_sides(const Study& study, const ParameterTable& table, std::size_t row,
+                             const Overrides& at, double gain, double fitted) {
   const Parameter& p = table[row];
   const double value = at.at(row);
   const EffectDiagnosis& effect = study.subject->effects->row(p.effect);
   const double searched = effect.search_error == nullptr ? 0 : effect.search_error(p, value, gain);
   const double open = effect.ambiguity == nullptr ? 0 : effect.ambiguity(study, p, at);
-  return std::hypot(model_error(effect, p, value), searched, open);
+  const double rest = kNormal90 * std::hypot(fitted, searched, open);
+  const IntervalSides model = model_error(effect, p, value);
+  return {std::hypot(rest, model.below), std::hypot(rest, model.above)};
 }
 
 }  // namespace gapfarm

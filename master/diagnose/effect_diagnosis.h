@@ -76,6 +76,7 @@ struct SearchedSize {
   const char* key;
   double size;
   bool logarithm = false;
+  double model_error = 0;  // in place of the effect's, where above 0
 };
 
 struct EffectDiagnosis {
@@ -110,8 +111,8 @@ struct EffectDiagnosis {
   std::optional<Polar> polar = {};
   void (*start)(const EffectStart& at, std::map<std::string, double>* values) = nullptr;
 
-  // Standard deviation of its size between simulations that share the effect but not the contact of
-  // treads and floor (docs/diagnosis.md), relative; of its direction, rad.
+  // What its size differs by between simulations that share the effect but not the contact
+  // (docs/diagnosis.md): a factor of 1 + this is one standard deviation; of its direction, rad.
   double model_error = 0;
   double direction_error_rad = 0;
   // What was searched rather than fitted may be a neighbour of the best: standard deviation for a
@@ -166,10 +167,14 @@ EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, cons
 
 void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string, double>* values);
 
-// Standard deviation, in the unit of table row `row`, of what the fit's linearisation cannot see:
-// that another simulation of the same effect gives it another size, and that places are searched.
-// `at` holds the effect's values; the effect gained `gain` nats.
-double error_beyond_fit(const Study& study, const ParameterTable& table, std::size_t row,
-                        const Overrides& at, double gain);
+// How far a 90 % interval reaches from a value, in its unit.
+struct IntervalSides {
+  double below = 0, above = 0;
+};
+// Of table row `row`, with what the fit (standard deviation `fitted`) leaves open and what its
+// linearisation cannot see: that another simulation of the same effect gives it another size, and
+// that places are searched.  `at` holds the effect's values; the effect gained `gain` nats.
+IntervalSides interval_sides(const Study& study, const ParameterTable& table, std::size_t row,
+                             const Overrides& at, double gain, double fitted);
 
 }  // namespace gapfarm

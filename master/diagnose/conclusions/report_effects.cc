@@ -66,17 +66,16 @@ Estimate reported_estimate(const DiagnosisRequest& of, const Refit& refit,
   Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
   const Deviation deviation = deviation_of(refit, row);
   if (deviation.fitted > 0) e.sd = deviation.fitted;
-  const double half =
-      kNormal90 * std::hypot(deviation.fitted, error_beyond_fit(judged.named.study(), of.table(),
-                                                                row, estimates.at, chosen.gain));
-  e.lo = value - half;
-  e.hi = value + half;
+  const IntervalSides reach = interval_sides(judged.named.study(), of.table(), row, estimates.at,
+                                             chosen.gain, deviation.fitted);
+  e.lo = value - reach.below;
+  e.hi = value + reach.above;
   if (!e.key.ends_with("direction")) {
     e.lo = std::max(e.lo, p.lower);
     e.hi = std::min(e.hi, p.upper);
   }
   if (deviation.least > 0 && std::isfinite(deviation.least)) e.bound = deviation.least;
-  if (e.bound) e.width_over_bound = half / kNormal90 / *e.bound;
+  if (e.bound) e.width_over_bound = (reach.below + reach.above) / 2 / kNormal90 / *e.bound;
   const double frame = of.frame_of(p.key, estimates.at);
   for (double* bound : {&e.value, &e.lo, &e.hi}) *bound += frame;
   return e;

@@ -30,11 +30,14 @@ bool is_turned(const EffectDiagnosis& row) {
 // directions, from which all follow.
 std::vector<Probe> turned_probes(const EffectDiagnosis& row) {
   const std::string direction = key_of(row, "direction");
-  const auto& [strength, size, logarithm] = row.searched.front();
+  const SearchedSize& strength = row.searched.front();
   std::vector<double> turns = {0, kThirdOfTurn_rad, -kThirdOfTurn_rad};
   if (row.polar) turns = {0, std::numbers::pi / 2 / row.polar->symmetry};
   return mapped(turns, [&](double turn) {
-    return Probe{row.effect, {{key_of(row, strength), size}, {direction, turn}}, {}, size};
+    return Probe{row.effect,
+                 {{key_of(row, strength.key), strength.size}, {direction, turn}},
+                 {},
+                 strength.size};
   });
 }
 

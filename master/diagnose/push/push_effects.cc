@@ -11,14 +11,15 @@
 namespace gapfarm {
 namespace {
 
-// `model_error` of friction: what strengths are off by on logs of another simulator, which has laws
-// of its own (scripts/foreign_pushes.sh; two or three logs an effect).
+// `model_error`: what strengths are off by on logs of another simulator, which has laws of its own
+// (scripts/foreign_pushes.sh; one to three logs an effect).
 std::vector<EffectDiagnosis> push_rows() {
   return {
       {.effect = "friction_anisotropy",
        .searched = {{"ratio", 0.2}},
        .polar = Polar{"friction_anisotropy.ratio", "friction_anisotropy.direction", 2, true},
        .model_error = 0.9,
+       .direction_error_rad = 0.008,
        .phrases =
            {"Friction across the table's grain is %1 times that along it, and the grain runs at %2",
             {{"ratio", 1, ""}, {"direction", kDegrees, " degrees"}}}},
@@ -56,9 +57,11 @@ std::vector<EffectDiagnosis> push_rows() {
                    {{"stretch", 1, ""}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "finger_compliance",
        .searched = {{"compliance", 0.001}},
+       .model_error = 0.6,
        .phrases = {"The finger gives way by %1 to every newton", {{"compliance", 1000, " mm"}}}},
       {.effect = "placement_bias",
-       .searched = {{"x", 0.002}, {"y", 0.002}, {"angle", 0.02}},
+       .searched = {{"x", 0.002}, {"y", 0.002}, {"angle", 0.02, false, 0.3}},
+       .model_error = 0.05,
        .phrases =
            {"Pieces truly start %1 along x and %2 along y from where the log says, turned by %3",
             {{"x", 1000, " mm"}, {"y", 1000, " mm"}, {"angle", 1000, " mrad"}}}},
