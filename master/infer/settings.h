@@ -141,11 +141,6 @@ inline constexpr double kAliasCosine = 0.9;
 inline constexpr double kLeastSlipGain = 11;
 // what the effects on the means explain | round | The same of outliers beside effects.
 inline constexpr double kLeastOutlierShare = 0.03;
-// trials | round | With the log's own rate of slips, in every group of drives.
-inline constexpr double kPriorTrials = 5;
-// nats | derived: the best of about 500 places reaches it in less than one of 500 logs (Kulldorff
-// 1997) | Slips that gather in one place are no slips.
-inline constexpr double kLeastGathering = 10;
 // squared s.d. | derived: chi-squared of 3 degrees, one in 110 | A trial beyond it is an outlier.
 inline constexpr double kFarSquared = 11.5;
 // nats | chosen: the share and the age are searched on a grid | Late readings, and a lag of paths,

@@ -27,29 +27,16 @@ double mean_loss(const Study& study, const SlipFit& slip) {
 }
 
 // Whether most outlier trials end nowhere near where a slip would have led them.
-bool are_other_outliers(const std::vector<SlipTrial>& trials,
-                        const std::vector<bool>& informative) {
-  std::size_t as_slips = 0, otherwise = 0;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    if (!informative[i] || trials[i].squared < kFarSquared) continue;
-    ++(trials[i].nearest < kFarSquared ? as_slips : otherwise);
-  }
-  return otherwise > as_slips;
-}
-
-std::string why_no_slips(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
-                         const SlipFit& slip, const std::vector<bool>& informative) {
+bool are_other_outliers(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                        const SlipFit& slip, const std::vector<bool>& informative) {
   const std::vector<SlipTrial> judged =
       trials_with_slips(study.trials, residuals, slip, slip.probability * slip.loss / 2, 0);
-  if (are_other_outliers(judged, informative)) {
-    return "Single drives are outliers, most of them to where no slip would have led: nothing "
-           "explains them that was looked for.";
+  std::size_t as_slips = 0, otherwise = 0;
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    if (!informative[i] || judged[i].squared < kFarSquared) continue;
+    ++(judged[i].nearest < kFarSquared ? as_slips : otherwise);
   }
-  const Gathering gathering =
-      gathering_of_slips(study, mapped(judged, &SlipTrial::slipped), informative);
-  if (gathering.gain < kLeastGathering) return "";
-  return "Single drives are outliers, most of them " + gathering.where +
-         ": something lies there that nothing explains which was looked for.";
+  return otherwise > as_slips;
 }
 
 SpreadFit fit_slips(const Study& study, const std::vector<Eigen::Vector3d>& residuals, double) {
@@ -61,7 +48,11 @@ SpreadFit fit_slips(const Study& study, const std::vector<Eigen::Vector3d>& resi
       slip.gain,
       {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}}};
   fit.noise = slip.noise;
-  if (slip.gain >= kLeastSlipGain) fit.odd = why_no_slips(study, residuals, slip, informative);
+  if (slip.gain >= kLeastSlipGain && are_other_outliers(study, residuals, slip, informative)) {
+    fit.odd =
+        "Single drives are outliers, most of them to where no slip would have led: nothing "
+        "explains them that was looked for.";
+  }
   return fit;
 }
 

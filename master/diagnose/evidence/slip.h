@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "master/diagnose/evidence/residuals.h"
@@ -26,7 +25,6 @@ SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::V
 
 struct SlipTrial {
   double score = 0;    // log predictive density, nats
-  double slipped = 0;  // probability that a side did
   double squared = 0;  // squared distance from where it would end without, and
   double nearest = 0;  // from the nearest place where it ends if one side slips
 };
@@ -39,18 +37,5 @@ std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
 
 // Mean fourth power over squared mean square: 3 for a Gaussian, and where there is nothing.
 double residual_kurtosis(const Eigen::VectorXd& whitened);
-
-struct Gathering {
-  double gain = 0;           // nats, of the best place over slips that fall anywhere
-  std::string where;         // in words: a disc, or a line that the drives cross
-  std::vector<bool> passed;  // whether each trial's drive went there
-};
-
-// Scan for a place that drives pass through in which they slip more often than elsewhere: Kulldorff
-// (1997), Poisson.  `slipped`: probability that each trial did; trials of false `informative` do
-// not count.  Longer drives show slips better, so what is expected goes by kind and length of a
-// drive.
-Gathering gathering_of_slips(const Study& study, std::span<const double> slipped,
-                             const std::vector<bool>& informative);
 
 }  // namespace gapfarm

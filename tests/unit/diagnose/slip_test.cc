@@ -5,7 +5,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 #include "common/math/statistics.h"
@@ -103,7 +102,6 @@ TEST(TrialsWithSlips, WithoutEventsItIsTheDensityOfOutliers) {
   for (std::size_t i = 0; i < d.trials.size(); ++i) {
     const auto cov = Covariance3::factorise(trial_covariance(d.trials[i], kTruth));
     EXPECT_NEAR(judged[i].score, log_predictive_density(d.residuals[i], *cov, 0.02), 1e-9);
-    EXPECT_NEAR(judged[i].slipped, 0, 1e-12);
   }
 }
 
@@ -148,90 +146,14 @@ TEST(TrialsWithSlips, ForeseenSlipsScoreHigher) {
   const SlipFit fit = fit_slip(d.trials, d.residuals, std::vector<bool>(600, true), kStart);
   const NoiseEstimate wide = refit_drive_noise(d.trials, d.residuals, kStart, false);
   const SlipFit none{.noise = wide};
-  std::vector<double> with, without, slipped;
+  std::vector<double> with, without;
   for (const SlipTrial& t : trials_with_slips(d.trials, d.residuals, fit, 0.015, 0.02)) {
     with.push_back(t.score);
-    slipped.push_back(t.slipped);
   }
   for (const SlipTrial& t : trials_with_slips(d.trials, d.residuals, none, 0, 0.02)) {
     without.push_back(t.score);
   }
   EXPECT_GT(mean(with) - mean(without), 0.1);
-  EXPECT_NEAR(mean(slipped), 0.19, 0.1);  // 1 - 0.9^2
-}
-
-// Drives that a side slipped in, as likely as they are reported.
-struct Scene {
-  Study study;
-  std::vector<double> slipped;
-  std::vector<bool> informative;
-};
-
-Scene scene(std::uint64_t seed) {
-  Scene s;
-  s.study.trials = draw(seed).trials;
-  s.study.cells.resize(6);
-  for (std::size_t c = 0; c < 6; ++c) {
-    s.study.cells[c].kind = c % 2 == 1 ? MotionKind::kTurn : MotionKind::kStraight;
-    s.study.cells[c].path = 0.5 * static_cast<double>(1 + c % 3);
-  }
-  for (std::size_t i = 0; i < s.study.size(); ++i) s.study.trials[i].cell = i % 6;
-  s.slipped.assign(s.study.size(), 0);
-  s.informative.assign(s.study.size(), true);
-  return s;
-}
-
-TEST(GatheringOfSlips, NoneWhereSlipsFallAnywhere) {
-  double most = 0;
-  for (std::uint64_t seed = 0; seed < 40; ++seed) {
-    Scene s = scene(seed);
-    Stream stream({.run_seed = 100 + seed});
-    // Longer drives show more of them.
-    for (std::size_t i = 0; i < s.slipped.size(); ++i) {
-      s.slipped[i] = stream.bernoulli(0.1 * s.study.cells[i % 6].path) ? 1 : 0;
-    }
-    most = std::max(most, gathering_of_slips(s.study, s.slipped, s.informative).gain);
-  }
-  EXPECT_LT(most, kLeastGathering);
-  EXPECT_GT(most, 2);
-}
-
-TEST(GatheringOfSlips, FindsADisc) {
-  Scene s = scene(1);
-  for (std::size_t i = 0; i < s.slipped.size(); ++i) {
-    const Pose& at = s.study.trials[i].X_WS;
-    s.slipped[i] = std::hypot(at.x - 1.2, at.y - 0.8) < 0.2 && i % 4 != 0 ? 1 : i % 50 == 0;
-  }
-  const Gathering found = gathering_of_slips(s.study, s.slipped, s.informative);
-  EXPECT_GT(found.gain, kLeastGathering);
-  double radius = 0, x = 0, y = 0;
-  ASSERT_EQ(std::sscanf(found.where.c_str(), "within %lf m of (%lf, %lf)", &radius, &x, &y), 3)
-      << found.where;
-  EXPECT_LT(std::hypot(x - 1.2, y - 0.8), 0.2);
-  // Not among trials that something else made lie far off.
-  for (std::size_t i = 0; i < s.slipped.size(); ++i) {
-    const Pose& at = s.study.trials[i].X_WS;
-    if (std::hypot(at.x - 1.2, at.y - 0.8) < 0.2) s.informative[i] = false;
-  }
-  EXPECT_LT(gathering_of_slips(s.study, s.slipped, s.informative).gain, kLeastGathering);
-}
-
-TEST(GatheringOfSlips, FindsALine) {
-  Scene s = scene(1);
-  for (std::size_t i = 0; i < s.slipped.size(); ++i) {
-    const ResidualTrial& t = s.study.trials[i];
-    if ((t.X_WS.y > 1) != (t.X_WP.y > 1)) s.slipped[i] = 0.9;
-  }
-  const Gathering found = gathering_of_slips(s.study, s.slipped, s.informative);
-  EXPECT_GT(found.gain, kLeastGathering);
-  double y = 0;
-  ASSERT_EQ(std::sscanf(found.where.c_str(), "across y = %lf", &y), 1) << found.where;
-  EXPECT_NEAR(y, 1, 0.06);
-}
-
-TEST(GatheringOfSlips, NoSlipsGatherNowhere) {
-  const Scene s = scene(1);
-  EXPECT_EQ(gathering_of_slips(s.study, s.slipped, s.informative).gain, 0);
 }
 
 TEST(ResidualKurtosis, ReportsTailsFromNone) {
