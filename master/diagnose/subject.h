@@ -80,8 +80,8 @@ struct DiagnosisSubject {
   std::vector<std::string> (*cautions)(const Study& study, const TrialLog& log);
   // What the log would need to part effects that look alike in it.
   std::vector<std::string> (*lacks)(const Study& study, const TrialLog& log);
-  // Trials that might part competing explanations.
-  ExperimentPlan (*experiments)(const Problem& problem);
+  // Trials that might part competing explanations; null as above.
+  ExperimentPlan (*experiments)(const Problem& problem) = nullptr;
   TrialView (*view)(const Study& study, std::size_t trial);
   std::vector<ShownCovariate> shown;  // in the pictures, beside what every log has
   PictureLabels labels;

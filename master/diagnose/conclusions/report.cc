@@ -224,6 +224,7 @@ DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const Parti
 
 Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Proposals& catalogue,
                  Diagnosis* diagnosis) {
+  if (of.subject.experiments == nullptr) return {};
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {
     if (named.chosen[k].aliases.empty()) continue;
     ASSIGN_OR_RETURN(const auto alternatives, alternatives_of(of, named, k, catalogue));

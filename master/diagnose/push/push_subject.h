@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "master/diagnose/conclusions/next_experiment.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {
@@ -45,10 +44,5 @@ TrialView push_view(const Study& study, std::size_t trial);
 
 // A shift along and across the push (across: to its left), in the axes of the predicted end.
 Eigen::Vector3d from_push_axes(const ResidualTrial& trial, const Eigen::Vector3d& shift);
-
-// Pushes of the problem's log, as different as it has them: as they were, turned with the table
-// under them, elsewhere on it, with the finger further to a side, faster and slower.
-// REQUIRES: a push log.
-ExperimentPlan plan_pushes(const Problem& problem);
 
 }  // namespace gapfarm

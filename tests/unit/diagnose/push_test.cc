@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "common/parameters/table.h"
 #include "common/random/stream.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/push/push_subject.h"
@@ -172,6 +174,26 @@ TEST(PushStudy, TunesOneShapeFactorAPieceAndWhatTheConfigSearches) {
   const ParameterTable& table = problem.table();
   EXPECT_EQ(rows({{table.row("ground_friction"), 0.1, 1, ParameterScale::kLog}}),
             (Keys{"ground_friction"}));
+}
+
+// An angle of 0.058 rad on a table of friction 0.35 was stated as 0.21 where pushes of one speed
+// had to show both.
+TEST(PushCautions, AnAngleOfTiltIsKnownBesideTheFrictionAlone) {
+  Study study;
+  study.trials.resize(80);
+  for (ResidualTrial& t : study.trials) t.push = {.touched = true, .speed_m_s = 0.05};
+  study.cells.resize(1);
+  const auto cautioned = [&] {
+    const auto all = push_cautions(study, {});
+    return std::ranges::any_of(all, [](const std::string& text) {
+      return text.find("table_tilt is known only") != std::string::npos;
+    });
+  };
+  EXPECT_FALSE(cautioned()) << "friction is not searched";
+  study.base[row_of(Push::kGroundFriction)] = 0.35;
+  EXPECT_TRUE(cautioned());
+  for (std::size_t i = 0; i < 40; ++i) study.trials[i].push.speed_m_s = 0.1;
+  EXPECT_FALSE(cautioned());
 }
 
 }  // namespace
