@@ -289,16 +289,13 @@ std::optional<SanityFinding> missing_too_much(const Refit& refit) {
 // What closes next to nothing has to do so without a warning: beside a large gap a few nats are to
 // be had by anything.  How much it closes is known only by the noise's own tails.
 std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<NestedFit>& nested,
-                                   std::optional<double> perfect,
-                                   const std::set<std::string>& put_last) {
+                                   std::optional<double> perfect) {
   const std::size_t before = judged.named.as_logged ? 1 : 0;
   const double gap =
       perfect ? std::max(*perfect, mean(nested.back().scores)) - mean(nested.front().scores) : 0;
   std::optional<std::size_t> worst;
   double least = INFINITY;
   for (std::size_t k = judged.named.chosen.size(); k-- > 0;) {
-    const bool last = k + 1 == judged.named.chosen.size();
-    if (!last && put_last.count(judged.named.chosen[k].effect())) continue;
     const std::vector<double>&with = nested[before + k + 1].scores,
           &without_it = nested[before + k].scores;
     const double gain = mean(with) - mean(without_it);

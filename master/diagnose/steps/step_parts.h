@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -92,11 +91,9 @@ struct Worthless {
   std::string why;
 };
 // Trials that no fit saw are predicted no better with it than with what comes before it alone.
-// `perfect`: what a prediction scores that misses nothing, once that is known.  `put_last`: effects
-// that were of use beside all others; they are not asked again.
+// `perfect`: what a prediction scores that misses nothing, once that is known.
 std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<NestedFit>& nested,
-                                   std::optional<double> perfect,
-                                   const std::set<std::string>& put_last = {});
+                                   std::optional<double> perfect);
 Judgement dropped(Judgement judged, const Worthless& effect);
 // Why an effect of these values is no cause: its best size is more than there can be.
 std::optional<std::string> at_its_bound(const DiagnosisRequest& of, const std::string& effect,

@@ -1,7 +1,6 @@
 // The fits behind the figures.
 
 #include <algorithm>
-#include <set>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -163,15 +162,6 @@ Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, 
   return with_floor(of, std::move(refit), folds);
 }
 
-// Beside a gap of something else a prediction misses either way, and what explains the rest shows
-// only when that is explained: an effect has to be of no use beside all others.
-void put_last(std::size_t effect, std::vector<EffectCandidate>* chosen,
-              std::set<std::string>* names) {
-  names->insert((*chosen)[effect].effect());
-  const auto at = chosen->begin() + static_cast<std::ptrdiff_t>(effect);
-  std::rotate(at, at + 1, chosen->end());
-}
-
 // The reported values, with the base that fits beside them: report and model say the same.
 Result<Refit> with_final_fit(const DiagnosisRequest& of, Refit refit) {
   const Explanation& named = refit.judged.named;
@@ -211,11 +201,10 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   Explanation& named = refit.judged.named;
   const std::size_t found = named.chosen.size();
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
-  std::set<std::string> were_last;
   for (;;) {
     ASSIGN_OR_RETURN(refit.nested, nested_fits(of, named, folds));
     emit_gaps(of, refit.nested);
-    auto idle = of_no_use(refit.judged, refit.nested, std::nullopt, were_last);
+    auto idle = of_no_use(refit.judged, refit.nested, std::nullopt);
     if (!idle) {
       if (!named.chosen.empty()) {
         ASSIGN_OR_RETURN(auto fit, estimate_beside(of, named, refit.nested.back()));
@@ -226,13 +215,9 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
       }
       ASSIGN_OR_RETURN(auto corrected, with_correction(of, std::move(refit), folds));
       refit = with_floor(of, std::move(corrected), folds);
-      idle = of_no_use(refit.judged, refit.nested, refit.floor, were_last);
+      idle = of_no_use(refit.judged, refit.nested, refit.floor);
     }
     if (!idle) break;
-    if (idle->effect + 1 < named.chosen.size()) {
-      put_last(idle->effect, &named.chosen, &were_last);
-      continue;
-    }
     refit.judged = dropped(std::move(refit.judged), *idle);
   }
   const auto missing = missing_too_much(refit);

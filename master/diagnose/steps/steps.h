@@ -81,9 +81,6 @@ struct Explanation {
   const FoundSpread* spread(const std::string& effect) const {
     return find_by(spreads, effect, &FoundSpread::effect);
   }
-  void drop_spread(const std::string& effect) {
-    std::erase_if(spreads, [&](const FoundSpread& s) { return s.effect == effect; });
-  }
   bool names_outliers() const {
     return std::ranges::any_of(
         spreads, [](const FoundSpread& s) { return s.row != nullptr && !s.row->by_session; });

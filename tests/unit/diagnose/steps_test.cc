@@ -347,11 +347,6 @@ TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
   const auto worthless = of_no_use(judged, nested, std::nullopt);
   ASSERT_TRUE(worthless);
   EXPECT_EQ(worthless->effect, 0u);
-  // Beside all others it was of use: seed 31's aspect and turned marker, each of which showed only
-  // when the other was explained.
-  const std::string first = judged.named.chosen[0].effect();
-  EXPECT_FALSE(of_no_use(judged, nested, std::nullopt, {first}));
-  EXPECT_TRUE(of_no_use(judged, nested, std::nullopt, {"timing_offset"}));
   const steps::Judgement rest = dropped(judged, *worthless);
   ASSERT_EQ(rest.named.chosen.size(), 1u);
   EXPECT_EQ(rest.named.chosen[0].effect(), "timing_offset");
