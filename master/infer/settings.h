@@ -175,9 +175,6 @@ inline constexpr double kMostLeftoverScale = 1.4;
 // what the named effects explain | chosen: right effects left 1 to 4 %, effects outside the
 // catalogue under a wrong name 18 % and more | Who leaves more is not the cause.
 inline constexpr double kWrongShare = 0.15;
-// the same | chosen: a heading read askew left 15 % beside two seams, the two seams of the real
-// forward log leave 5 % | The same beside two seams or patches, which bend to much that is none.
-inline constexpr double kWrongShareOfTwo = 0.09;
 // nats a trial | chosen: the worst of 11 practice logs and of the real forward log keep 0.2 with
 // their effects | A model that misses more, against its own noise, is not the cause.
 inline constexpr double kMostMissed = 3;

@@ -343,11 +343,10 @@ std::vector<Leftover> leftovers(const Regression& explained,
   return all;
 }
 
-Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left,
-                      double wrong_share) {
+Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left) {
   const bool unknown = !left.empty() && left.front().log10_p < kUnknownLog10P;
   if (!unknown) return named ? Verdict::kEffect : Verdict::kNone;
-  if (!named || left.front().excess > wrong_share * std::max(explained_nats, 1.0)) {
+  if (!named || left.front().excess > kWrongShare * std::max(explained_nats, 1.0)) {
     return Verdict::kUnknown;
   }
   return Verdict::kEffectAndUnknown;

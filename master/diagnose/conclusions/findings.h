@@ -89,7 +89,6 @@ std::vector<Leftover> leftovers(const Regression& explained,
 // `explained_nats`: by the named effects.  Whether they are to be believed at all is the caller's
 // to drop when the verdict is kUnknown.  A leftover dependence below kUnknownLog10P is no
 // chance.
-Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left,
-                      double wrong_share = kWrongShare);
+Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left);
 
 }  // namespace gapfarm

@@ -169,11 +169,7 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
     named.spreads.push_back(
         {kRounding, {grid.nats, {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}}}});
   }
-  const bool two =
-      std::any_of(named.chosen.begin(), named.chosen.end(),
-                  [](const EffectCandidate& c) { return kind_of(c.effect()) != c.effect(); });
-  judged.verdict = judge_verdict(named.names_anything(), nats, judged.left,
-                                 two ? kWrongShareOfTwo : kWrongShare);
+  judged.verdict = judge_verdict(named.names_anything(), nats, judged.left);
   if (on_grid && !names_grid) {
     named.odd_readings =
         "The logged positions lie on a grid, which nothing that was looked for explains.";

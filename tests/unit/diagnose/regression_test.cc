@@ -84,7 +84,6 @@ TEST(Verdict, FollowsWhatIsNamedAndWhatIsLeft) {
   EXPECT_EQ(judge_verdict(true, 100, much), Verdict::kUnknown);
   const std::vector<Leftover> twelfth = {{"place", -10, 12}};
   EXPECT_EQ(judge_verdict(true, 100, twelfth), Verdict::kEffectAndUnknown);
-  EXPECT_EQ(judge_verdict(true, 100, twelfth, kWrongShareOfTwo), Verdict::kUnknown);
 }
 
 }  // namespace
