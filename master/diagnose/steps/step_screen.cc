@@ -138,19 +138,7 @@ Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explana
   return screening;
 }
 
-// Whether sessions differ beside what was chosen, too, as clearly as it takes to name that.
-bool sessions_still_differ(const DiagnosisRequest& of, const Explanation& found) {
-  for (const FoundSpread& spread : found.spreads) {
-    if (spread.row == nullptr || !spread.row->by_session) continue;
-    return found.chosen.empty() ||
-           spread.row->fit(found.study(), left_with_sessions(found), of.outlier_share()).gain >=
-               spread.row->least_gain;
-  }
-  return false;
-}
-
-// Sessions that seem to differ are measured again with what they have of their own taken out; they
-// may do so because of something else that the catalogue holds.
+// Sessions that seem to differ are measured again with what they have of their own taken out.
 Result<Screening> look_for_all(const DiagnosisRequest& of, Explanation partial) {
   auto found = look_for_late_readings(of, std::move(partial));
   if (found) found = look_for_lag(of, std::move(*found));
@@ -161,11 +149,7 @@ Result<Screening> look_for_all(const DiagnosisRequest& of, Explanation partial) 
   if (!differ.names_session_gains()) return look_beside_readings(of, *found);
   ASSIGN_OR_RETURN(auto measured, measure(of, differ.study()));
   differ.evidence = std::make_shared<const Evidence>(std::move(measured));
-  auto screening = look_beside_readings(of, differ);
-  if (screening && !sessions_still_differ(of, screening->found)) {
-    return look_beside_readings(of, *found);
-  }
-  return screening;
+  return look_beside_readings(of, differ);
 }
 
 }  // namespace
