@@ -28,11 +28,11 @@ struct Answer {
   std::optional<steps::Refit> refit;
 };
 
-Status ask(const steps::DiagnosisRequest& of, const steps::Evidence& measured, bool frees_base,
-           const std::function<void(int stage)>& begin, Answer* answer) {
+Status ask(const steps::DiagnosisRequest& of, const steps::Evidence& measured, StageClock* stages,
+           Answer* answer) {
+  const auto begin = [&](int stage) { stages->begin(kDiagnosisStages[stage].name); };
   begin(2);
-  ASSIGN_OR_RETURN(answer->screening,
-                   guarded([&] { return steps::screen(of, measured, frees_base); }));
+  ASSIGN_OR_RETURN(answer->screening, guarded([&] { return steps::screen(of, measured); }));
   const steps::Screening& screening = *answer->screening;
   emit_readings(of, screening.found);
   emit_choice(of, screening.found, screening.warning.has_value());
@@ -43,20 +43,6 @@ Status ask(const steps::DiagnosisRequest& of, const steps::Evidence& measured, b
   ASSIGN_OR_RETURN(answer->refit, guarded([&] {
                      return steps::refit(of, measured, screening, *answer->judgement);
                    }));
-  return {};
-}
-
-// What the catalogue explains may have drawn the base to where nobody would look for it, and be no
-// use from there: where nothing could be named all competes once more, the base free.
-Status ask_again(const steps::DiagnosisRequest& of, const steps::Evidence& measured,
-                 Answer* first) {
-  const bool named = first->refit->judged.named.names_anything();
-  if (named || !steps::beyond_search(of, measured.study)) return {};
-  Answer second;
-  const Status asked = ask(
-      of, measured, /*frees_base=*/true, [](int) {}, &second);
-  if (!asked) return asked.error().code == ErrorCode::kSimulation ? Status() : asked;
-  if (second.refit->judged.verdict == Verdict::kEffect) *first = std::move(second);
   return {};
 }
 
@@ -80,9 +66,7 @@ Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, StageClock
   emit_noise(of, measured->study);
 
   Answer found;
-  const auto begin = [&](int stage) { stages->begin(kDiagnosisStages[stage].name); };
-  Status answered = ask(of, *measured, /*frees_base=*/false, begin, &found);
-  if (answered) answered = ask_again(of, *measured, &found);
+  const Status answered = ask(of, *measured, stages, &found);
   if (found.screening) known.screening = &*found.screening;
   if (found.judgement) known.judged = &*found.judgement;
   if (!answered) return end_with(answered.error());

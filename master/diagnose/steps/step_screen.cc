@@ -231,19 +231,11 @@ double explained_nats(const Proposals& catalogue, const Regression& explained) {
   return (catalogue.nothing_explained().left_squares() - explained.left_squares()) / 2;
 }
 
-bool beyond_search(const DiagnosisRequest& of, const Study& tuned) {
-  if (of.subject.base_moves || !tuned.on_bounds.empty()) return false;
-  return std::ranges::any_of(of.options.genes, [&](const Gene& gene) {
-    const auto at = tuned.base.find(gene.row);
-    return at != tuned.base.end() && (at->second < gene.lower || at->second > gene.upper);
-  });
-}
-
-Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, bool frees_base) {
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured) {
   Explanation nothing;
   nothing.evidence = std::make_shared<const Evidence>(measured);
   const bool bounded = !measured.study.on_bounds.empty();
-  nothing.frees_base = bounded || frees_base;
+  nothing.frees_base = bounded;
   auto screening = look_for_all(of, nothing);
   if (!bounded) return screening;
   // A base on its bounds may be one that cannot be simulated with much of the catalogue.

@@ -55,8 +55,8 @@ struct Evidence {
 // The evidence as it is read now, and what explains it so far.
 struct Explanation {
   std::shared_ptr<const Evidence> evidence;
-  // What is strong may have drawn the base to itself: beside it the base is fitted once more, and
-  // all is looked for again from there.
+  // What is strong may have drawn the base to its bounds: beside it the base is fitted once more,
+  // and all is looked for again from there.
   bool frees_base = false;
   Overrides tuned_alone;  // the base without any effect, where the study's is not it
 
@@ -147,12 +147,8 @@ Result<Study> tune(const DiagnosisRequest& of);
 // The noise that no smooth function explains, and the log by it.
 Result<Evidence> measure(const DiagnosisRequest& of, const Study& tuned);
 
-// Whether tuning ended within its bounds, but where the config would not have searched.
-bool beyond_search(const DiagnosisRequest& of, const Study& tuned);
-
-// All that the catalogue offers, and what of it the log calls for; `frees_base`, or a base on its
-// bounds: as Explanation::frees_base.
-Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, bool frees_base);
+// All that the catalogue offers, and what of it the log calls for.
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured);
 
 // Whether that explains enough to be named.
 Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening);

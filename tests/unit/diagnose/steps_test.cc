@@ -279,21 +279,6 @@ struct Measured : Driven {
   steps::Explanation found;
 };
 
-// Seen in `gapfarm blind-check configs/srv1.toml --sizes clear --nulls 0 --left-out 0 --seed 41`,
-// case 10: a dead band had drawn the treads to a third of their length.
-TEST(Steps, ABaseThatNobodyWouldLookForIsAskedAboutAgain) {
-  Measured m;
-  const std::size_t speed = row_of(Srv1::kFullSpeed);
-  Study tuned = m.study;
-  EXPECT_FALSE(steps::beyond_search(m.of, tuned)) << "nothing is searched";
-  m.options.genes = {{speed, 0.1, 0.6}};
-  EXPECT_FALSE(steps::beyond_search(m.of, tuned));
-  tuned.base[speed] = 0.61;
-  EXPECT_TRUE(steps::beyond_search(m.of, tuned));
-  tuned.on_bounds = {speed};
-  EXPECT_FALSE(steps::beyond_search(m.of, tuned)) << "which has been looked into";
-}
-
 TEST(Steps, TrialsAreHeldOutOfACopy) {
   const Measured m;
   std::vector<bool> ignored(m.study.size(), false);
