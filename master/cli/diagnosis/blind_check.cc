@@ -27,7 +27,6 @@ struct BlindCheckOptions {
   std::vector<std::string> sizes = {"clear", "subtle"};
   std::optional<unsigned> trials, workers, jobs;
   std::optional<std::uint64_t> seed;
-  bool strengths = false;
 };
 
 Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
@@ -98,34 +97,6 @@ BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
   return hooks;
 }
 
-Result<int> show_strengths(const BlindCheckOptions& options, const Config& config,
-                           const SessionPlans& plan, DesignSettings design, CliContext& context) {
-  LongCommand::begin_if_possible("blind-check", KeepOption{}.place("blind-check", ""),
-                                 {{"find strengths"}}, context);
-  context.work->stage(0);
-  ASSIGN_OR_RETURN(const auto farm, start(options, config, context));
-  ASSIGN_OR_RETURN(const auto planned, planned_problem(config, plan, config.seed, *farm));
-  // The rest is made of the same effects and robots.
-  design.nulls = design.pairs = design.excluded = 0;
-  ASSIGN_OR_RETURN(const auto drawn, draw_design(planned, design, *farm));
-  const std::size_t trials = planned.log.trials.size();
-  const DesignSettings& asked = options.check.design;
-  const std::string table = format_design(drawn, planned.table());
-  context.console.result(std::to_string(trials) +
-                             " trials a case.  A case of every effect and size, with the strength "
-                             "that this experiment takes:\n\n" +
-                             table + "\nBeside these " + std::to_string(asked.nulls) + " nulls, " +
-                             std::to_string(asked.pairs) + " pairs and " +
-                             std::to_string(asked.excluded) +
-                             " effects excluded from the catalogue.\n",
-                         {{"trials", trials},
-                          {"design", table},
-                          {"nulls", asked.nulls},
-                          {"pairs", asked.pairs},
-                          {"left_out", asked.excluded}});
-  return kExitDone;
-}
-
 Result<int> print_check(const BlindCheckOptions& options, const Config& config,
                         CliContext& context) {
   const std::string& out = options.check.out;
@@ -134,7 +105,7 @@ Result<int> print_check(const BlindCheckOptions& options, const Config& config,
                                 ? "cases of effects, " + std::to_string(nulls) + " nulls and " +
                                       std::to_string(pairs) + " pairs"
                                 : "the cases of " + options.foreign;
-  return print_dry_run("diagnose " + cases + (out.empty() ? "" : " into " + out),
+  return print_dry_run("diagnose " + cases + " into " + out,
                        {{"out", out}, {"nulls", nulls}, {"pairs", pairs}}, all_workers(options),
                        config.farm, context);
 }
@@ -165,12 +136,6 @@ Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(const Config config, config_of(options, settings.plan, context.console));
   ASSIGN_OR_RETURN(const auto design, design_of(options, config));
   if (context.dry_run) return print_check(options, config, context);
-  if (options.strengths && options.foreign.empty()) {
-    return show_strengths(options, config, settings.plan, design, context);
-  }
-  if (settings.out.empty()) {
-    return Error{"--out DIR is missing: the folder for cases, seals and result"};
-  }
   RETURN_IF_ERROR(check_folder(settings.out, FolderKind::kBlindCheck));
   settings.design = design;
   settings.diagnose = diagnose_of(options);
@@ -219,7 +184,7 @@ SubcommandRun setup_blind_check(CLI::App& app) {
   auto options = std::make_shared<BlindCheckOptions>();
   BlindCheckSettings& check = options->check;
   app.add_option("CONFIG", check.diagnose.config_path, "Config file (TOML)")->required();
-  app.add_option("--out", check.out, "Folder for cases, seals, diagnoses and result");
+  app.add_option("--out", check.out, "Folder for cases, seals, diagnoses and result")->required();
   declare_cases(app, *options);
   app.add_option("--model", check.diagnose.model_path, "Base model for every diagnosis");
   app.add_option("--seed", options->seed, "Of robots, effects, plans and noise");
@@ -236,12 +201,9 @@ SubcommandRun setup_blind_check(CLI::App& app) {
   app.add_flag("--resume", check.resume,
                "Go on with the check in the folder as it was asked, whatever is asked now, or "
                "judge a finished one again; the same command goes on by itself");
-  app.add_flag("--strengths", options->strengths,
-               "Only report which strengths would be needed for every effect to be that large");
   declare_long_command(app);
   app.footer(
       "Examples:\n"
-      "  gapfarm blind-check configs/srv1.toml --strengths\n"
       "  gapfarm blind-check configs/srv1.toml --out run/blind --seed 7\n"
       "  gapfarm blind-check configs/push.toml --out run/pushes --sizes clear --trials 90\n"
       "  gapfarm blind-check configs/srv1.toml --out run/foreign --foreign logs/cases \\\n"

@@ -210,20 +210,6 @@ std::string reported_text(const ScoredCase& c) {
   return text;
 }
 
-// In the catalogue's order, the larger sizes first.
-std::vector<Truth> by_effect(std::vector<Truth> cases, const ParameterTable& table) {
-  const auto rank = [&table](const Truth& truth) {
-    if (truth.effects.empty()) return std::pair(table.size(), 0.0);
-    const TrueEffect& effect = truth.effects.front();
-    std::size_t e = 0;
-    while (e < table.effects().size() && table.effects()[e].name != effect.name) ++e;
-    return std::pair(e, -std::round(10 * effect.size));
-  };
-  std::ranges::stable_sort(cases,
-                           [&](const Truth& a, const Truth& b) { return rank(a) < rank(b); });
-  return cases;
-}
-
 std::string cases_markdown(const std::vector<ScoredCase>& cases) {
   std::string text = table_head({"case", "kind", "level", "truth", "said", "right", "covered",
                                  "promised", "realised", "s", "CPU s"});
@@ -302,34 +288,6 @@ std::string format_blind_summary(const BlindReport& report) {
             (c.has_truth ? c.judgement.why : reported_text(c)) + "\n";
   }
   return text;
-}
-
-std::string format_design(const BlindDesign& design, const ParameterTable& table) {
-  std::map<std::string, unsigned> kinds;
-  std::string text = formatted("%-9s %-8s %-8s %6s  %s\n", "case", "kind", "level", "size",
-                               "effect and parameters");
-  for (const Truth& truth : by_effect(design.cases, table)) {
-    ++kinds[case_kind_name(truth.kind)];
-    for (const TrueEffect& effect : truth.effects) {
-      text += formatted("%-9s %-8s %-8s %6.2f  ", truth.id.c_str(), case_kind_name(truth.kind),
-                        truth.level.c_str(), effect.size) +
-              effect.name;
-      for (const auto& [key, value] : effect.parameters) {
-        const auto row = table.find(effect.name + "." + key);
-        const Parameter* p = row ? &table[*row] : nullptr;
-        const bool choice = p && p->kind == ParameterKind::kChoice;
-        text += " " + key + " " + (choice ? table.format(*row, value) : short_number(value));
-        if (p && !choice && p->unit != "-") text += " " + p->unit;
-      }
-      text += "\n";
-    }
-  }
-  for (const OutOfReach& o : design.out_of_reach) {
-    text += o.effect + ": out of reach at " + o.level +
-            "; the strongest that the catalogue allows has size " + short_number(o.size) + "\n";
-  }
-  for (const auto& [kind, count] : kinds) text += std::to_string(count) + " " + kind + "  ";
-  return text + "\n";
 }
 
 }  // namespace gapfarm

@@ -207,7 +207,4 @@ std::string format_blind_markdown(const BlindReport& report);
 // The rates alone, for a terminal.
 std::string format_blind_summary(const BlindReport& report);
 
-// What would be made: every effect with its drawn parameters and size, and what is out of reach.
-std::string format_design(const BlindDesign& design, const ParameterTable& table);
-
 }  // namespace gapfarm
