@@ -195,12 +195,6 @@ SubcommandRun setup_blind_check(CLI::App& app) {
   app.add_option("--time-limit", check.diagnose.time_limit_s,
                  "s; a slower diagnosis counts as failed")
       ->check(CLI::PositiveNumber);
-  app.add_option("--key", check.key_path,
-                 "Keep the truths' key in this file, outside the folder, so that even a killed "
-                 "check can be resumed (default: OUT.key, written when stopped)");
-  app.add_flag("--resume", check.resume,
-               "Go on with the check in the folder as it was asked, whatever is asked now, or "
-               "judge a finished one again; the same command goes on by itself");
   declare_long_command(app);
   app.footer(
       "Examples:\n"

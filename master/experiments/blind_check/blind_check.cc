@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "common/base/hash.h"
 #include "common/trials/files.h"
 #include "common/trials/write.h"
 #include "master/experiments/blind_check/cases/seal.h"
@@ -13,16 +12,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Sealed truths in hand: just made, or taken from the box.
+// Sealed truths in hand: just made, or those of a check that was stopped.
 struct InHand {
-  TruthKey key;
   std::vector<SealedTruth> sealed;
   std::vector<OutOfReach> out_of_reach;
 };
-
-std::string key_path_of(const BlindCheckSettings& settings) {
-  return settings.key_path.empty() ? settings.out + ".key" : settings.key_path;
-}
 
 // Whether the folder holds this very check, stopped.
 bool goes_on(const BlindCheckSettings& settings, const CheckPaths& paths) {
@@ -34,15 +28,7 @@ bool goes_on(const BlindCheckSettings& settings, const CheckPaths& paths) {
 // A folder to start in: new, empty, or one whose making was cut short.
 Status check_fresh(const CheckPaths& paths) {
   if (!fs::exists(paths.state())) return {};
-  return Error{
-      paths.out +
-      ": holds another blind check, or a finished one; give --resume to go on with it as it "
-      "was asked, or another --out"};
-}
-
-// A file that only its owner can read.
-Status write_private_file(const std::string& path, std::string_view bytes) {
-  return write_file_atomically(path, bytes, IfThere::kReplace, 0600);
+  return Error{paths.out + ": holds another blind check, or a finished one; choose another --out"};
 }
 
 Status make_out(const std::string& out) {
@@ -74,47 +60,35 @@ Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settin
   ASSIGN_OR_RETURN(const auto logs, simulate_cases(config, design.cases, settings.plan, 0, *farm));
   RETURN_IF_ERROR(write_cases(design.cases, logs, paths));
 
-  InHand hand{TruthKey::random(), {}, design.out_of_reach};
+  InHand hand{{}, design.out_of_reach};
   for (const Truth& truth : design.cases) {
     hand.sealed.push_back({truth.id, random_salt(), format_truth(truth)});
   }
   RETURN_IF_ERROR(write_file_atomically(paths.seals(), format_seals(hand.sealed)));
-  RETURN_IF_ERROR(write_private_file(paths.box(), hand.key.close_box(hand.sealed)));
-  // Last: from here on the check can be resumed.
-  const CheckState state{content_hash(config.text), design.out_of_reach, settings.asked};
+  // Last: from here on the check can go on.
+  const CheckState state{design.out_of_reach, settings.asked};
   RETURN_IF_ERROR(write_check_state(state, paths.state()));
   return hand;
 }
 
-Result<TruthKey> find_key(const BlindCheckSettings& settings, const CheckPaths& paths) {
-  // An opened check may be scored again.
-  const std::string path =
-      fs::exists(paths.opened_key()) ? paths.opened_key() : key_path_of(settings);
-  const Result<std::string> text = read_text_file(path);
-  if (!text) {
-    return Error{path + ": the key that opens " + paths.box() +
-                 " is not there; it is written when a check is stopped, and gone when it was "
-                 "killed.  Start again (with --key FILE a killed check can be resumed too)"};
-  }
-  return TruthKey::parse(*text, path);
-}
-
-Result<InHand> take_up(const Config& config, const BlindCheckSettings& settings,
-                       const CheckPaths& paths) {
+// Truths of the check as it was stopped, or as it was opened: that one is judged again.
+Result<InHand> take_up(const CheckPaths& paths) {
   ASSIGN_OR_RETURN(const CheckState state, read_check_state(paths.state()));
-  if (state.made_of != content_hash(config.text)) {
-    return Error{paths.out + ": was made from another config than " + config.path +
-                 "; resume it with that one, or choose another --out"};
+  const bool opened = fs::exists(paths.opened_truths());
+  const std::string file = opened ? paths.opened_truths() : paths.stopped_truths();
+  const Result<std::string> text = read_text_file(file);
+  if (!text) {
+    return Error{file +
+                 ": the truths are not there; they are written when a check is stopped, and "
+                 "gone when it was killed.  Start again, in another --out"};
   }
-  ASSIGN_OR_RETURN(TruthKey key, find_key(settings, paths));
-  ASSIGN_OR_RETURN(const auto box, read_text_file(paths.box()));
-  ASSIGN_OR_RETURN(const auto sealed, key.open_box(box, paths.box()));
+  ASSIGN_OR_RETURN(const auto sealed, parse_sealed(*text, file));
   ASSIGN_OR_RETURN(const auto seals, read_text_file(paths.seals()));
   RETURN_IF_ERROR(verify_seals(sealed, seals, paths.seals()));
-  // No key lies about while diagnoses run, unless the user wants one.
+  // They do not lie about while diagnoses run.
   std::error_code ignored;
-  if (settings.key_path.empty()) fs::remove(key_path_of(settings), ignored);
-  return InHand{key, sealed, state.out_of_reach};
+  fs::remove(paths.stopped_truths(), ignored);
+  return InHand{sealed, state.out_of_reach};
 }
 
 Result<std::vector<Truth>> truths_of(const InHand& hand) {
@@ -126,20 +100,13 @@ Result<std::vector<Truth>> truths_of(const InHand& hand) {
   return truths;
 }
 
-Status open_truths(const InHand& hand, const BlindCheckSettings& settings,
-                   const CheckPaths& paths) {
+Status open_truths(const InHand& hand, const CheckPaths& paths) {
   ASSIGN_OR_RETURN(const auto seals, read_text_file(paths.seals()));
   RETURN_IF_ERROR(verify_seals(hand.sealed, seals, paths.seals()));
-  std::string salts;
   for (const SealedTruth& sealed : hand.sealed) {
     RETURN_IF_ERROR(write_file_atomically(paths.truth(sealed.id), sealed.truth));
-    salts += sealed.id + " " + sealed.salt + "\n";
   }
-  RETURN_IF_ERROR(write_file_atomically(paths.salts(), salts));
-  RETURN_IF_ERROR(write_file_atomically(paths.opened_key(), hand.key.text()));
-  std::error_code ignored;
-  fs::remove(key_path_of(settings), ignored);
-  return {};
+  return write_file_atomically(paths.opened_truths(), format_sealed(hand.sealed));
 }
 
 // Promised against realised, for the cases in which an effect was named; and what is closed of
@@ -187,15 +154,13 @@ Status diagnose_blindly(const InHand& hand, const std::vector<Truth>& truths,
     open.push_back({truth.id, paths.trials(truth.id), truth.excluded});
   }
   const PrivateMemory unreadable;
-  const std::string key_path = key_path_of(settings);
-  if (!settings.key_path.empty()) {
-    RETURN_IF_ERROR(write_private_file(key_path, hand.key.text()));
-  }
   Status diagnosed = diagnose_cases(open, paths, settings.diagnose, hooks);
   if (diagnosed) return {};
-  RETURN_IF_ERROR(write_private_file(key_path, hand.key.text()));
+  // A file that only its owner can read.
+  RETURN_IF_ERROR(write_file_atomically(paths.stopped_truths(), format_sealed(hand.sealed),
+                                        IfThere::kReplace, 0600));
   if (hooks.note)
-    hooks.note("stopped; the key of the truths is in " + key_path +
+    hooks.note("stopped; the truths are in " + paths.stopped_truths() +
                ", and the same command goes on from here");
   return diagnosed;
 }
@@ -219,8 +184,8 @@ Result<Problem> planned_problem(const Config& config, const SessionPlans& plan, 
 Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettings& settings,
                                     const BlindCheckHooks& hooks) {
   const CheckPaths paths{settings.out};
-  ASSIGN_OR_RETURN(const InHand hand, settings.resume || goes_on(settings, paths)
-                                          ? take_up(config, settings, paths)
+  ASSIGN_OR_RETURN(const InHand hand, goes_on(settings, paths)
+                                          ? take_up(paths)
                                           : make_cases(config, settings, hooks, paths));
   ASSIGN_OR_RETURN(const auto truths, truths_of(hand));
   if (hooks.note) {
@@ -230,7 +195,7 @@ Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettin
     RETURN_IF_ERROR(hooks.on_sealed());
   }
   RETURN_IF_ERROR(diagnose_blindly(hand, truths, settings, hooks, paths));
-  RETURN_IF_ERROR(open_truths(hand, settings, paths));
+  RETURN_IF_ERROR(open_truths(hand, paths));
   BlindReport report{settings.provenance, {}, hand.out_of_reach};
   for (const Truth& truth : truths) report.cases.push_back(scored(truth, paths));
   RETURN_IF_ERROR(add_realised(config, settings, hooks, paths, report.cases));
@@ -252,15 +217,9 @@ Result<BlindReport> run_foreign_check(const std::string& cases, const std::strin
     return Error{cases + ": has no CASE/trials.csv" + (code ? " (" + code.message() + ")" : "")};
   }
   std::ranges::sort(open, {}, &OpenCase::id);
-  const std::string made_of = fs::weakly_canonical(cases, code).string();
-  if (!settings.resume && !goes_on(settings, paths)) {
+  if (!goes_on(settings, paths)) {
     RETURN_IF_ERROR(check_fresh(paths));
-    RETURN_IF_ERROR(write_check_state({made_of, {}, settings.asked}, paths.state()));
-  } else {
-    ASSIGN_OR_RETURN(const CheckState state, read_check_state(paths.state()));
-    if (state.made_of != made_of) {
-      return Error{paths.out + ": is the check of " + state.made_of + ", not of " + made_of};
-    }
+    RETURN_IF_ERROR(write_check_state({{}, settings.asked}, paths.state()));
   }
   RETURN_IF_ERROR(diagnose_cases(open, paths, settings.diagnose, hooks));
   BlindReport report{settings.provenance, {}, {}};

@@ -2,16 +2,14 @@
 //
 //   check.json            what it was made of
 //   seals.txt             a seal a case, published before the first diagnosis
-//   truths.box            truths and salts, sealed up until all cases are diagnosed
 //   cases/ID/trials.csv   all that a diagnosis is given, beside the config
 //   diagnoses/ID/         what it answered, output.txt, and outcome.json once it has ended
-//   truth/ID.json, truth/salts.txt, truth.key    when opened
-//   blind_check.json, blind_check.md             the result
+//   truth/ID.json, truth/sealed.json     when opened: truths, and with them their salts
+//   blind_check.json, blind_check.md     the result
 //
-// The key of the box stays in this process's memory, which no other process of the user can read
-// (PrivateMemory).  It is written to a file only when the check is stopped, after the last
-// diagnosis process has ended, and taken away again when the check is resumed.  A user who wants to
-// resume even after SIGKILL names a key file beforehand; it then lies there while diagnoses run.
+// Until they are opened, truths stay in this process's memory, which no other process of the user
+// can read (PrivateMemory).  They are written to `out`.truths only when the check is stopped, after
+// the last diagnosis process has ended, and taken away again when it goes on.
 #pragma once
 
 #include <functional>
@@ -59,17 +57,15 @@ struct BlindCheckSettings {
   DesignSettings design;
   DiagnoseSettings diagnose;
   std::string out;
-  std::string key_path;  // empty: `out` + ".key", written only when the check is stopped
-  bool resume = false;   // also a check that is opened, or whose `asked` is another
   // What the check is asked, in any words; one that was stopped goes on when it is asked the same.
   std::string asked;
   SessionPlans plan;  // of every case; empty: each draws its own as the config says
   std::vector<std::pair<std::string, std::string>> provenance;  // for the report
 };
 
-// Errors: `out` holds another check, or a finished one without `resume`; seals that do not match; a
-// lost key; kStopped, when everything is in place to resume; the farm's and the file
-// system's own.
+// Errors: `out` holds another check, or a finished one (without blind_check.json it is judged
+// again); seals that do not match; truths that are gone with a killed process; kStopped, when
+// everything is in place to go on; the farm's and the file system's own.
 Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettings& settings,
                                     const BlindCheckHooks& hooks);
 
@@ -92,19 +88,17 @@ struct CheckPaths {
 
   std::string state() const { return out + "/check.json"; }
   std::string seals() const { return out + "/seals.txt"; }
-  std::string box() const { return out + "/truths.box"; }
-  std::string opened_key() const { return out + "/truth.key"; }
+  std::string stopped_truths() const { return out + ".truths"; }
+  std::string opened_truths() const { return out + "/truth/sealed.json"; }
   std::string trials(const std::string& id) const { return out + "/cases/" + id + "/trials.csv"; }
   std::string diagnosis(const std::string& id) const { return out + "/diagnoses/" + id; }
   std::string outcome(const std::string& id) const { return diagnosis(id) + "/outcome.json"; }
   std::string truth(const std::string& id) const { return out + "/truth/" + id + ".json"; }
   std::string result() const { return out + "/blind_check.json"; }
-  std::string salts() const { return out + "/truth/salts.txt"; }
 };
 
 // check.json.
 struct CheckState {
-  std::string made_of;  // hash of the config's text, or the folder of foreign cases
   std::vector<OutOfReach> out_of_reach;
   std::string asked;  // BlindCheckSettings::asked
 };

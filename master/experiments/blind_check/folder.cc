@@ -162,7 +162,7 @@ namespace {
 
 constexpr auto kOutOfReach = [](auto& v, auto& row) { FIELDS(effect, level, size); };
 constexpr auto kCheckState = [](auto& v, auto& row) {
-  FIELDS(made_of, asked);
+  FIELDS(asked);
   v.list("out_of_reach", row.out_of_reach, kOutOfReach);
 };
 constexpr auto kChildEnd = [](auto& v, auto& row) { FIELDS(status, wall_s, cpu_s, text); };
@@ -223,7 +223,7 @@ Status write_check_state(const CheckState& state, const std::string& path) {
 Result<CheckState> read_check_state(const std::string& path) {
   ASSIGN_OR_RETURN(const std::string text, read_text_file(path));
   const Json json = parse_json(text);
-  if (!json.is_object() || !json.value("made_of", Json()).is_string()) {
+  if (!json.is_object() || !json.value("asked", Json()).is_string()) {
     return Error{path + ": is not the state of a blind check; choose another --out"};
   }
   return LenientFields::read<CheckState>(json, kCheckState);

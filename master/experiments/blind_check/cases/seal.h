@@ -2,8 +2,8 @@
 // until they are opened.
 //
 // A seal is BLAKE2b-256(salt || truth) with a random salt of 16 bytes: it fixes the truth, and the
-// salt keeps it from being guessed.  Until they are opened, truths and salts lie in one box
-// (XSalsa20-Poly1305, libsodium's secretbox) whose key only the process that made it holds.
+// salt keeps it from being guessed.  Until they are opened, truths and salts stay in the memory of
+// the process that made them.
 #pragma once
 
 #include <cstdint>
@@ -72,28 +72,9 @@ std::string format_seals(const std::vector<SealedTruth>& truths);
 Status verify_seals(const std::vector<SealedTruth>& truths, std::string_view seals,
                     const std::string& file);
 
-// A secret key, wiped from memory when it goes.
-class TruthKey {
- public:
-  static TruthKey random();
-  // Of the text of a key file; the error names the file.
-  static Result<TruthKey> parse(std::string_view text, const std::string& file);
-  ~TruthKey();
-  TruthKey(const TruthKey&) = default;
-  TruthKey& operator=(const TruthKey&) = default;
-  TruthKey(TruthKey&&) = default;
-  TruthKey& operator=(TruthKey&&) = default;
-
-  std::string text() const;  // 64 hex digits and a line end
-
-  std::string close_box(const std::vector<SealedTruth>& truths) const;
-  // Error: another key's box, or a box that was changed.
-  Result<std::vector<SealedTruth>> open_box(std::string_view box, const std::string& file) const;
-
- private:
-  TruthKey() = default;
-  std::vector<unsigned char> bytes_;
-};
+// A file of truths and salts, as a stopped check leaves it.
+std::string format_sealed(const std::vector<SealedTruth>& truths);
+Result<std::vector<SealedTruth>> parse_sealed(const std::string& text, const std::string& file);
 
 // While it lives, no other process of the user can read this one's memory through /proc or ptrace,
 // and it leaves no core.
