@@ -50,7 +50,6 @@ struct OptimiserSettings {
 // Where a search begins in place of the config's own values, and where that is from.
 struct SearchStart {
   std::vector<Genome> genomes;  // best first, of the problem's genes; empty: the config's values
-  std::vector<double> spread;   // of the first, a covariance row by row; empty: unknown
   std::string from;             // a table, a model, a run
   // Of a run that another one branches off: its generation, the digest up to there, "GENE=VALUE",
   // and keys.

@@ -55,7 +55,6 @@ OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem&
     setup.settings.seed_nominal = true;
     setup.nominal = start.genomes.front();
     setup.given.assign(start.genomes.begin() + 1, start.genomes.end());
-    setup.spread = start.spread;
     return setup;
   }
   // Where kinematics show a value, no generation need look for it.

@@ -33,14 +33,6 @@ std::uint64_t most_evaluations(const EvolutionSettings& settings, std::size_t ge
 // length, and what the optimiser itself has to say (genetic.h).
 Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup);
 
-struct Carried {
-  std::vector<Genome> population;  // best first; empty: of a method that has none
-  std::vector<double> spread;      // CMA-ES's covariance row by row; empty: another method
-};
-
-// Out of Optimiser::state() of any kind but stages; what cannot be read leaves nothing.
-Carried carried_by(std::string_view state, std::size_t genes);
-
 // Stages: an optimiser over some of the genes, then one over others, each from the best so far.
 
 // Every stage is a run of the setup's optimiser over its genes, with draws of its own; the others

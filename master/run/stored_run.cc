@@ -38,7 +38,6 @@ constexpr const char* kFolder = "folder";
 
 Json start_json(const SearchStart& start) {
   Json json = {{"from", start.from}, {"genomes", start.genomes}};
-  if (!start.spread.empty()) json["spread"] = start.spread;
   if (start.generation > 0) {
     json["generation"] = start.generation;
     json["digest"] = start.digest;
@@ -63,8 +62,6 @@ SearchStart stored_start(const RunInfo& info, std::size_t genes) {
   for (const Json& genome : json.value("genomes", Json::array())) {
     if (genome.size() == genes) start.genomes.push_back(numbers(genome));
   }
-  start.spread = numbers(json.value("spread", Json::array()));
-  if (start.spread.size() != genes * genes) start.spread.clear();
   return start;
 }
 

@@ -191,63 +191,17 @@ Status change_genes(const BranchOptions& options, const std::string& run, Config
   return {};
 }
 
-// A search before and after its genes changed.
-struct GeneChange {
-  const Problem& before;
-  const Problem& after;
-
-  // Where each gene was; none: it was no gene.
-  std::vector<std::optional<std::size_t>> places() const {
-    std::vector<std::optional<std::size_t>> found;
-    for (const Gene& gene : after.genes) {
-      const auto old = std::ranges::find(before.genes, gene);
-      found.push_back(old == before.genes.end()
-                          ? std::nullopt
-                          : std::optional(static_cast<std::size_t>(old - before.genes.begin())));
-    }
-    return found;
+// The same genes, and for what was no gene its value in `after`.
+Genome changed_genome(const Genome& genome, const Problem& before, const Problem& after) {
+  Genome changed;
+  for (const Gene& gene : after.genes) {
+    const auto old = std::ranges::find(before.genes, gene);
+    changed.push_back(old == before.genes.end()
+                          ? encode_gene(after.table(), gene, after.values[gene.row])
+                          : genome[static_cast<std::size_t>(old - before.genes.begin())]);
   }
-
-  Genome carried(const Genome& genome) const {
-    Genome changed;
-    const auto from = places();
-    for (std::size_t g = 0; g < from.size(); ++g) {
-      const Gene& gene = after.genes[g];
-      changed.push_back(from[g] ? genome[*from[g]]
-                                : encode_gene(after.table(), gene, after.values[gene.row]));
-    }
-    return changed;
-  }
-
-  // What is left of a covariance: wider, up to `sigma`, where a gene was fixed further from the
-  // best than it was spread; and `sigma` for what was freed.
-  std::vector<double> carried(const std::vector<double>& spread, const Genome& best,
-                              double sigma) const {
-    const std::size_t n = before.genes.size(), m = after.genes.size();
-    const auto from = places();
-    double wider = 1, widest = 0;
-    for (std::size_t g = 0; g < n; ++g) {
-      const bool kept = contains(from, g);
-      const double variance = spread[g * n + g];
-      if (kept) widest = std::max(widest, variance);
-      if (kept || variance <= 0) continue;
-      const Gene& gene = before.genes[g];
-      const double step = encode_gene(before.table(), gene,
-                                      std::clamp(after.values[gene.row], gene.lower, gene.upper)) -
-                          best[g];
-      wider = std::max(wider, step * step / variance);
-    }
-    if (widest > 0) wider = std::max(1.0, std::min(wider, sigma * sigma / widest));
-    std::vector<double> left(m * m, 0.0);
-    for (std::size_t i = 0; i < m; ++i) {
-      for (std::size_t k = 0; k < m; ++k) {
-        if (from[i] && from[k]) left[i * m + k] = wider * spread[*from[i] * n + *from[k]];
-      }
-      if (!from[i]) left[i * m + i] = sigma * sigma;
-    }
-    return left;
-  }
-};
+  return changed;
+}
 
 }  // namespace
 
@@ -292,27 +246,21 @@ Status branch_off(const RunReader& run, const BranchOptions& options, Config& co
   }
   const Problem before = config.problem;
   RETURN_IF_ERROR(change_genes(options, name, config));
-  const GeneChange change{before, config.problem};
   ASSIGN_OR_RETURN(const auto members, run.individuals(at));
-  ASSIGN_OR_RETURN(const std::string state, run.optimiser_state(at));
-  const std::size_t genes = before.genes.size();
-  if (members.empty() || members.front().genome.size() != genes) {
-    return Error{fmt::format("{}: generation {} has no best; the store is damaged", name, at)};
-  }
-  const Genome& best = members.front().genome;
-  const Carried carried = carried_by(state, genes);
   SearchStart start;
   start.from = name;
   start.generation = at;
   start.digest = generations[at - 1].digest;
   start.fixed = options.fixed;
   start.freed = options.freed;
-  start.genomes = {change.carried(best)};
-  for (const Genome& genome : carried.population) start.genomes.push_back(change.carried(genome));
-  keep_first(start.genomes, config.evolution);
-  if (!carried.spread.empty()) {
-    start.spread = change.carried(carried.spread, best, config.evolution.optimiser.sigma);
+  for (const StoredIndividual& member : members) {
+    if (member.genome.size() != before.genes.size()) continue;
+    start.genomes.push_back(changed_genome(member.genome, before, config.problem));
   }
+  if (start.genomes.empty()) {
+    return Error{fmt::format("{}: generation {} has no best; the store is damaged", name, at)};
+  }
+  keep_first(start.genomes, config.evolution);
   config.evolution.start = std::move(start);
   return {};
 }

@@ -26,8 +26,8 @@ struct BranchOptions {
 };
 
 // What a run goes on as in a run of its own: `config` is the run's (stored_config), and becomes one
-// with other genes that begins at the run's population, or at its best with the width that CMA-ES
-// had.  Errors: nothing to branch off, stages, no such gene, a value that it does not take.
+// with other genes that begins at the individuals of its last generation.  Errors: nothing to
+// branch off, stages, no such gene, a value that it does not take.
 Status branch_off(const RunReader& run, const BranchOptions& options, Config& config);
 
 }  // namespace gapfarm

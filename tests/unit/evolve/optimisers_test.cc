@@ -255,28 +255,6 @@ TEST_P(EveryOptimiser, StartsAtTheConfigsOwnValues) {
   EXPECT_THAT(make_optimiser(setup).error().message, testing::HasSubstr("search range"));
 }
 
-TEST_P(EveryOptimiser, LeavesItsPopulationOrItsWidth) {
-  ToyRun run(sphere(3), settings(), 5);
-  for (int i = 0; i < 30; ++i) run.generation();
-  const Carried carried = carried_by(run.optimiser().state(), 3);
-  using Kind = OptimiserKind;
-  const bool population = GetParam() == Kind::kGenetic || GetParam() == Kind::kDeSimplex ||
-                          GetParam() == Kind::kDifferentialEvolution;
-  EXPECT_EQ(carried.population.empty(), !population);
-  if (population) {
-    EXPECT_EQ(carried.population.front(), run.optimiser().best().genome);
-  }
-  if (GetParam() != Kind::kAutoSearch) {  // which may have got to CMA-ES
-    EXPECT_EQ(carried.spread.size(), GetParam() == Kind::kCmaEs ? 9 : 0);
-  }
-  // Narrower than it began by now.
-  for (std::size_t k = 0; k < carried.spread.size(); k += 4) {
-    EXPECT_GT(carried.spread[k], 0);
-    EXPECT_LT(carried.spread[k], 0.3 * 0.3);
-  }
-  EXPECT_TRUE(carried_by("damaged", 3).population.empty());
-}
-
 TEST_P(EveryOptimiser, SurvivesFailures) {
   for (const bool hopeless : {false, true}) {
     ToyRun run(sphere(3), settings(), 6);
