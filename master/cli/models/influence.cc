@@ -44,8 +44,7 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
   ASSIGN_OR_RETURN(const Config config,
                    command.traced.open(command.config, &command.settings.trace));
   command.outputs.reads(config);
-  RETURN_IF_ERROR(
-      command.outputs.plan_in(command.out, {"influence.csv", "influence.html", "genes.toml"}));
+  RETURN_IF_ERROR(command.outputs.plan_in(command.out, {"influence.csv", "genes.toml"}));
   show_notes(config.problem.log, context.console);
   for (std::size_t i = 0; i < kPathDistances.size(); ++i) {
     if (command.distance == kPathDistances[i].name) command.settings.distance = i;
@@ -63,16 +62,12 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
                                                       config.farm, context));
   ASSIGN_OR_RETURN(const auto report, find_influence(*asked, config.problem, genes,
                                                      command.settings, context.work->hooks()));
-  RETURN_IF_ERROR(command.outputs.write_in(
-      command.out,
-      {{"influence.csv", influence_csv(report, table)},
-       {"influence.html", influence_page(report, table, command.settings,
-                                         "Influence of parameters: " + config.problem.scenario)},
-       {"genes.toml", influential_genes(report, table)}}));
+  RETURN_IF_ERROR(
+      command.outputs.write_in(command.out, {{"influence.csv", influence_csv(report, table)},
+                                             {"genes.toml", influential_genes(report, table)}}));
   context.console.result(influence_text(report, table), to_json(report, table));
-  context.console.note(
-      "wrote: " + (std::filesystem::path(command.out) / "influence.html").string() +
-      ", influence.csv, genes.toml");
+  context.console.note("wrote: " + (std::filesystem::path(command.out) / "influence.csv").string() +
+                       ", genes.toml");
   return kExitDone;
 }
 
@@ -85,8 +80,7 @@ SubcommandRun setup_influence(CLI::App& app) {
                  "The standard; its [genes] say what to vary and how far, without them every base "
                  "parameter varies over its range")
       ->required();
-  app.add_option("--out", command->out, "Folder for the tables, the page and genes.toml")
-      ->required();
+  app.add_option("--out", command->out, "Folder for influence.csv and genes.toml")->required();
   app.add_option("--distance", command->distance, "Between paths")
       ->check(CLI::IsMember({"lettier", "hausdorff", "frechet"}))
       ->capture_default_str();

@@ -241,7 +241,6 @@ class InfluenceStudy {
       }
     }
     if (noise.empty()) return;
-    report_.box_repeat_distance = median(noise);
     std::vector<double> p;
     for (std::size_t f = 0; f < k; ++f) {
       const bool further = !steps[f].empty() && median(steps[f]) > median(noise) + kLeast_m;

@@ -111,7 +111,6 @@ struct InfluenceReport {
   double horizon_s = 0;
   double repeat_distance = 0;            // median between repeats of the standard, at the horizon
   Interval repeat_95;                    // 2.5 % to 97.5 % of those distances
-  double box_repeat_distance = 0;        // the same at Morris's random points
   std::vector<FactorInfluence> factors;  // most influential alone first
 };
 
@@ -125,11 +124,8 @@ Result<InfluenceReport> find_influence(Farm& farm, const Problem& problem,
 // Ranges in the table's own bounds of every base row (effects omitted).
 std::vector<Gene> all_base_genes(const ParameterTable& table);
 
-// Text, CSV, and a page with bars.
 std::string influence_text(const InfluenceReport& report, const ParameterTable& table);
 std::string influence_csv(const InfluenceReport& report, const ParameterTable& table);
-std::string influence_page(const InfluenceReport& report, const ParameterTable& table,
-                           const InfluenceSettings& settings, const std::string& title);
 
 // The section [genes] of a config that searches the influential ones (by either method).
 std::string influential_genes(const InfluenceReport& report, const ParameterTable& table);

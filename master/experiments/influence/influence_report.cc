@@ -1,13 +1,9 @@
-// The influence of parameters as text, CSV, page and genes.
+// The influence of parameters as text, CSV and genes.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 
-#include "common/base/ranges.h"
 #include "master/experiments/influence/influence.h"
-#include "master/report/figures/figures.h"
-#include "master/report/html.h"
-#include "master/report/page_frame.h"
 
 namespace gapfarm {
 namespace {
@@ -21,45 +17,10 @@ std::string interval_text(const Interval& interval) {
   return distance_text(interval.lower) + " to " + distance_text(interval.upper);
 }
 
-std::string gene_range(const Gene& gene, const ParameterTable& table) {
-  return table.format(gene.row, gene.lower) + " to " + table.format(gene.row, gene.upper);
-}
-
 // The value without its unit, as TOML has it.
 std::string toml_value(const ParameterTable& table, std::size_t row, double value) {
   const std::string text = table.text_of(row, value);
   return table[row].kind == ParameterKind::kChoice ? '"' + text + '"' : text;
-}
-
-// The furthest on top.  What is beyond all bounds is omitted.
-LineChart distances_chart(const InfluenceReport& report, const ParameterTable& table,
-                          Influence FactorInfluence::*method, double repeats) {
-  constexpr double kMost_m = 1e5, kRow = 22;
-  LineChart chart;
-  std::vector<FactorInfluence> factors = report.factors;
-  std::ranges::stable_sort(
-      factors, {}, [&](const FactorInfluence& factor) { return (factor.*method).distance; });
-  for (const FactorInfluence& factor : factors) {
-    const Influence& of = factor.*method;
-    if (of.distance >= kMost_m) continue;
-    const double y = static_cast<double>(chart.y_names.size());
-    chart.y_names.push_back(table[factor.gene.row].key);
-    const std::string name = of.influential ? "influential" : "not distinguished from repeats";
-    ChartSeries series{.marks = {{of.distance, y, NAN}},
-                       .colour = of.influential ? "#0072b2" : "#999999"};
-    if (!contains(chart.series, name, &ChartSeries::name)) series.name = name;
-    if (std::isfinite(of.distance_95.lower)) {
-      series.line = {{of.distance_95.lower, y}, {std::min(of.distance_95.upper, kMost_m), y}};
-    }
-    chart.series.push_back(std::move(series));
-  }
-  const double rows = static_cast<double>(chart.y_names.size());
-  chart.height = kRow * (rows + 1);
-  chart.series.push_back({.name = "repeats",
-                          .line = {{repeats, -0.5}, {repeats, rows - 0.5}},
-                          .colour = "#d55e00",
-                          .dashed = true});
-  return chart;
 }
 
 }  // namespace
@@ -101,63 +62,6 @@ std::string influence_csv(const InfluenceReport& report, const ParameterTable& t
                         report.horizon_s);
   }
   return text;
-}
-
-std::string influence_page(const InfluenceReport& report, const ParameterTable& table,
-                           const InfluenceSettings& settings, const std::string& title) {
-  PlainPage page(title);
-  page.paragraph(fmt::format(
-      "Distances between paths ({}) over the first {} s. A parameter counts as influential when it "
-      "moves the path further than repeating the run does: Mann-Whitney test, adjusted by Holm "
-      "over the parameters, level {}.",
-      kPathDistances[settings.distance].name, number_text(report.horizon_s), settings.alpha));
-  page.heading("How far ahead paths can be compared");
-  page.paragraph(
-      "Tiny differences at the start grow with every collision. Beyond the horizon repeats of the "
-      "same run are as far apart as anything, and no parameter could be distinguished from "
-      "chance.");
-  LineChart growth;
-  growth.title = "Repeats of the standard";
-  growth.x_title = "s compared";
-  growth.y_title = "m, median over pairs of repeats";
-  growth.log_y = true;
-  ChartSeries apart{.name = "apart"};
-  ChartSeries allowed{.name = "allowed share of the path's extent"};
-  for (const HorizonPoint& point : report.horizons) {
-    apart.line.push_back({point.horizon_s, point.repeat_distance});
-    allowed.line.push_back({point.horizon_s, settings.chaos_share * point.extent});
-  }
-  growth.series = {apart, allowed};
-  page.picture(line_chart(growth), growth.title);
-  std::vector<std::vector<std::string>> alone, morris;
-  for (const FactorInfluence& f : report.factors) {
-    const auto row = [&](const Influence& of, std::vector<std::string> more) {
-      std::vector<std::string> cells = {table[f.gene.row].key,         distance_text(of.distance),
-                                        interval_text(of.distance_95), p_text(of.p),
-                                        of.influential ? "yes" : "no", std::to_string(of.failures)};
-      cells.insert(cells.begin() + 1, more.begin(), more.end());
-      return cells;
-    };
-    alone.push_back(row(f.alone, {gene_range(f.gene, table), table.format(f.gene.row, f.level)}));
-    morris.push_back(row(f.morris, {distance_text(f.sigma)}));
-  }
-  page.heading("One parameter at a time");
-  LineChart distances =
-      distances_chart(report, table, &FactorInfluence::alone, report.repeat_distance);
-  distances.title = "Furthest level of each parameter";
-  distances.x_title = "m from the standard's path, median and 95 %";
-  page.picture(line_chart(distances), distances.title);
-  page.table(
-      {"parameter", "range", "furthest at", "m", "95 %", "p", "influential", "runs that failed"},
-      alone);
-  page.heading("Morris: one parameter a step, all over the box");
-  distances = distances_chart(report, table, &FactorInfluence::morris, report.box_repeat_distance);
-  distances.title = "Mean distance a step of two thirds of the range moves the path";
-  distances.x_title = "m, mean and 95 %";
-  page.picture(line_chart(distances), distances.title);
-  page.table({"parameter", "sigma, m", "mean, m", "95 %", "p", "influential", "runs that failed"},
-             morris);
-  return page.finish();
 }
 
 std::string influential_genes(const InfluenceReport& report, const ParameterTable& table) {

@@ -34,7 +34,6 @@ struct ChartLevel {  // a horizontal line
 
 struct LineChart {
   std::string title, x_title, y_title;
-  std::vector<std::string> y_names;  // of y = 0, 1, ...; empty: numbers
   std::string note;                  // below the title
   double width = 860, height = 340;  // px, of the whole and of the plot
   bool log_x = false;

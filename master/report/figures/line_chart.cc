@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 
-#include "common/base/ranges.h"
 #include "master/report/figures/figures.h"
 
 namespace gapfarm {
@@ -56,10 +55,10 @@ struct Axis {
 
 struct Frame {
   Axis x = {}, y = {};
-  double left, width, height;
+  double width, height;
 
   SvgPoint at(double px, double py) const {
-    return {left + x.share(px) * width, kPlotY + height - y.share(py) * height};
+    return {kPlotX + x.share(px) * width, kPlotY + height - y.share(py) * height};
   }
   bool holds(const Pose& X) const {
     const double right = x.share(X.x), up = y.share(X.y);
@@ -77,11 +76,7 @@ std::vector<SvgPoint> places_of(const ChartSeries& series) {
 }
 
 Frame frame_of(const LineChart& chart) {
-  double left = kPlotX;
-  for (const std::string& name : chart.y_names) {
-    left = std::max(left, 14 + kTextWidth * static_cast<double>(name.size()));
-  }
-  Frame frame{.left = left, .width = chart.width - left - kRight, .height = chart.height};
+  Frame frame{.width = chart.width - kPlotX - kRight, .height = chart.height};
   frame.x.logarithmic = chart.log_x;
   frame.y.logarithmic = chart.log_y;
   bool first = true;
@@ -124,21 +119,14 @@ void draw_axes(Svg& svg, const Frame& frame, const LineChart& chart) {
   const SvgText middle{.size = 11, .colour = kGrey, .anchor = SvgAnchor::kMiddle};
   SvgText end = middle;
   end.anchor = SvgAnchor::kEnd;
-  const double bottom = kPlotY + frame.height, left = frame.left, right = left + frame.width;
-  auto ys = frame.y.ticks(static_cast<unsigned>(frame.height / 55));
-  if (!chart.y_names.empty()) {
-    ys =
-        mapped(indices(chart.y_names.size()), [](std::size_t k) { return static_cast<double>(k); });
-  }
+  const double bottom = kPlotY + frame.height, left = kPlotX, right = left + frame.width;
+  const auto ys = frame.y.ticks(static_cast<unsigned>(frame.height / 55));
   const auto xs = frame.x.ticks(std::max(4u, static_cast<unsigned>(frame.width / 94)));
   for (const double tick : ys) {
     const double y = bottom - frame.height * frame.y.share(tick);
     if (y < kPlotY || y > bottom) continue;
     svg.line({left, y}, {right, y}, {.stroke = "#e9e9e9"});
-    svg.text({left - 7, y + 4},
-             chart.y_names.empty() ? frame.y.label(tick, ys)
-                                   : chart.y_names[static_cast<std::size_t>(tick)],
-             end);
+    svg.text({left - 7, y + 4}, frame.y.label(tick, ys), end);
   }
   for (const double tick : xs) {
     const double x = left + frame.width * frame.x.share(tick);
@@ -257,7 +245,7 @@ double height_of(const LineChart& chart, bool with_legend) {
 
 void draw_chart(Svg& svg, const LineChart& chart, bool with_legend) {
   const Frame frame = frame_of(chart);
-  const double right = frame.left + frame.width;
+  const double right = kPlotX + frame.width;
   std::size_t beyond = 0;
   for (const ChartSeries& series : chart.series) {
     beyond += static_cast<std::size_t>(
@@ -267,14 +255,14 @@ void draw_chart(Svg& svg, const LineChart& chart, bool with_legend) {
   svg.text({18, 30}, chart.title, {.size = 16, .bold = true});
   svg.text({18, 46}, chart.note + more, {.size = 11, .colour = kGrey});
   draw_axes(svg, frame, chart);
-  svg.begin_clip({frame.left, kPlotY}, frame.width, frame.height);
+  svg.begin_clip({kPlotX, kPlotY}, frame.width, frame.height);
   for (std::size_t i = 0; i < chart.series.size(); ++i) {
     draw_series(svg, frame, chart.series[i], i);
   }
   for (const ChartLevel& level : chart.levels) {
     if (!frame.y.shows(level.y)) continue;
     const double y = kPlotY + frame.height * (1 - frame.y.share(level.y));
-    svg.line({frame.left, y}, {right, y}, kLevelStyle);
+    svg.line({kPlotX, y}, {right, y}, kLevelStyle);
     if (y > kPlotY && y < kPlotY + frame.height) {
       svg.text({right - 4, y - 4}, level.name,
                {.size = 11, .colour = "#444444", .anchor = SvgAnchor::kEnd});

@@ -68,7 +68,6 @@ TEST_F(RacquetballInfluence, ReportsWhatMattersFromWhatDoesNot) {
   for (FactorInfluence& f : none.factors) f.alone.influential = f.morris.influential = false;
   EXPECT_THAT(influence_text(none, table), HasSubstr("so genes.toml is empty; more --repeats"));
   EXPECT_THAT(influence_csv(*report, table), HasSubstr("\ngravity,5,15,"));
-  EXPECT_THAT(influence_page(*report, table, small(), "T"), HasSubstr("launch_speed"));
 }
 
 TEST_F(RacquetballInfluence, TheHorizonEndsWhereRepeatsPart) {
