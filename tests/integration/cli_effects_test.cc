@@ -1,7 +1,6 @@
-// gapfarm effects: the catalogue in words, for programs, and in pictures.
+// gapfarm effects: the catalogue in words and for programs.
 #include <gmock/gmock.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "common/effects/catalogue.h"
@@ -39,21 +38,6 @@ TEST(CliEffects, ListsTheCatalogueOfTheConfigsScenario) {
   EXPECT_THAT(ball.out, HasSubstr("has no catalogue of effects"));
   const Finished missing = gapfarm_command({"effects", "none.toml"});
   EXPECT_EQ(missing.exit_code, 2);
-}
-
-TEST(CliEffects, DrawsAPictureOfEach) {
-  const TemporaryFolder folder;
-  const std::string pictures = folder / "pictures";
-  const Finished drawn = gapfarm_command({"effects", "--figures", pictures});
-  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
-  for (const Effect& effect : srv1_effects()) {
-    const auto path = std::filesystem::path(pictures) / (effect.name + ".svg");
-    ASSERT_TRUE(std::filesystem::exists(path)) << effect.name;
-    EXPECT_LT(std::filesystem::file_size(path), 25000u) << effect.name;
-  }
-  const Finished wrong = gapfarm_command({"effects", folder / "none.toml", "--figures", pictures});
-  EXPECT_EQ(wrong.exit_code, 2);
-  EXPECT_THAT(wrong.err, HasSubstr("none.toml"));
 }
 
 }  // namespace gapfarm::cli_effects_test

@@ -96,7 +96,6 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
       {{"influence", demo, "--command", "forward", "--out", out}, "would trace"},
       {{"stability", demo, "--command", "forward", "--out", out}, "would search 7 parameters"},
       {{"plan", demo, "--out", out}, "would plan 120 trials"},
-      {{"effects", demo, "--figures", out}, " pictures into "},
       {{"predict", "--mined", log, "--trials", log, "--out", out}, "would predict 120 trials"},
   };
   for (auto [arguments, would] : commands) {
@@ -113,13 +112,11 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
 // What is wrong with the request is found before any work, by a dry run too.
 TEST(CliUsage, WrongNamesAreWrongUsageAndLeaveNothing) {
   const TemporaryFolder folder;
-  const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml", out = folder / "out",
-                    push = GAPFARM_SOURCE_DIR "/configs/push.toml";
+  const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml", out = folder / "out";
   const std::vector<std::pair<std::vector<std::string>, const char*>> commands = {
       {{"diagnose", demo, "--out", out, "--exclude", "camera_seem"}, "camera_seam"},
       {{"crossfit", demo, "--by", "nosuch"}, "nosuch"},
       {{"crossfit", demo, "--test", "command=disc"}, "no trials are left"},
-      {{"effects", push, "--figures", out}, "omit --figures"},
   };
   for (auto [arguments, named] : commands) {
     for (const bool dry : {true, false}) {

@@ -45,7 +45,7 @@ const std::vector<OptionTakes> kOptionTakes = {
      {"RUN|MODEL", "RUN|CONFIG", "CONFIG|RUN|DIAGNOSIS", "MODEL", "--model", "--from"}},
     {Takes::kDiagnosis, {"DIAGNOSIS"}},
     {Takes::kFolder,
-     {"DIR", "--keys", "--keep", "--runs", "--figures", "--foreign", "--truth", "--worker-keys",
+     {"DIR", "--keys", "--keep", "--runs", "--foreign", "--truth", "--worker-keys",
       "--worker-logs"}},
     {Takes::kFile,
      {"FILE", "FILES", "LOG", "LOG|URDF", "--trials", "--paths", "--history", "--mined", "--like",

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "common/effects/catalogue.h"
 #include "common/pose/pose.h"
 #include "common/problem/problem.h"
 #include "common/svg/svg.h"
@@ -24,7 +23,6 @@ struct ChartSeries {
   std::string colour = {};       // empty: by the place among the series
   bool dashed = false;
   bool filled = false;  // the line surrounds a faint area
-  bool scene = false;   // does not stretch the axes
 };
 
 struct ChartLevel {  // a horizontal line
@@ -84,28 +82,5 @@ struct PredictionOfLog {
 // One panel a command: its trials at the duties and duration that the log has most of.
 std::vector<PosePanel> pose_panels(const Problem& problem,
                                    const std::vector<PredictionOfLog>& predictions);
-
-// What an effect does to the scenario's commands, as a picture.
-
-// One drive as the log has it.
-struct LoggedDrive {
-  std::vector<Pose> path;
-  Pose end;
-};
-
-// One command, with and without the effect; poses in the frame of the logged start.
-struct EffectDrives {
-  std::string command;
-  LoggedDrive without;
-  std::vector<LoggedDrive> with;  // more than one where chance has a say
-};
-
-// An SVG with a panel a command: the drive without the effect dashed, with it solid, each with a
-// stroke along the heading of its end, and by how much the end differs.
-// The drives are seen from X_WS, heading along the world's x.  Directions, discs, lines and centres
-// among the effect's `values` (in the catalogue's order) are drawn too, recognised by their
-// parameters' names: direction; x, y and radius; position and axis; x, y.
-std::string effect_figure(const Effect& effect, std::span<const double> values, const Pose& X_WS,
-                          std::span<const EffectDrives> drives);
 
 }  // namespace gapfarm

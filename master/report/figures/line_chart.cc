@@ -85,7 +85,7 @@ Frame frame_of(const LineChart& chart) {
   };
   for (const ChartSeries& series : chart.series) {
     for (const SvgPoint& point : places_of(series)) {
-      if (series.scene || !frame.x.shows(point.x) || !frame.y.shows(point.y)) continue;
+      if (!frame.x.shows(point.x) || !frame.y.shows(point.y)) continue;
       frame.x.include(clamped(point.x, chart.x_least, chart.x_most), first);
       frame.y.include(clamped(point.y, chart.y_least, chart.y_most), first);
       first = false;

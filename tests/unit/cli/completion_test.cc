@@ -64,7 +64,7 @@ TEST(Completion, KnowsEffectsAndParameters) {
   EXPECT_THAT(after({"simulate", "none.toml", "--set", "fric"}),
               IsSupersetOf({"friction=", "friction_patch.ratio=", "friction_patch_2.ratio=",
                             "friction_ratio="}));
-  EXPECT_THAT(after({"effects", "--figures", "x", "--force", "--work"}), ElementsAre("--workers"));
+  EXPECT_THAT(after({"simulate", "x", "--force", "--work"}), ElementsAre("--workers"));
 }
 
 TEST_F(CompletionFiles, ConfigsAreTomlAndRunsHaveAStore) {
