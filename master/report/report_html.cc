@@ -54,9 +54,6 @@ std::string shape_section(const Diagnosis& diagnosis) {
   if (diagnosis.residual && !diagnosis.residual->correction.field.empty()) {
     html += plot_grid("shape");
   }
-  if (diagnosis.residual && diagnosis.residual->correction.outliers) {
-    html += R"(<div class="grid" id="outlier-plots"></div>)" + std::string(kNoScript);
-  }
   if (!diagnosis.nearest.empty()) {
     html += "<h3>What comes nearest, and why it is not the cause</h3>" +
             html_list(mapped(diagnosis.nearest, &NearMiss::text));

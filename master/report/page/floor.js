@@ -63,24 +63,6 @@ function seamLayers(frame) {
   return layers;
 }
 
-// Straight lines of the floor as the lens shows them, with its bend made visible.
-function lensLayers(frame) {
-  const [k1, cx, cy] = ["k1", "x", "y"].map((k) => valueOf(`camera_distortion.${k}`));
-  const reach = Math.max(...[frame.x.min, frame.x.max].flatMap((x) => [frame.y.min, frame.y.max].map((y) => Math.hypot(x - cx, y - cy))));
-  const width = frame.x.max - frame.x.min;
-  const times = roundBelow(Math.max(1, (0.06 * width) / Math.max(Math.abs(k1) * reach ** 3, 1e-9)));
-  const seen = (x, y) => {
-    const r2 = (x - cx) ** 2 + (y - cy) ** 2;
-    return [x + times * k1 * r2 * (x - cx), y + times * k1 * r2 * (y - cy)];
-  };
-  const lines = [
-    ...spaced(frame.x, 6).map((x) => spaced(frame.y, 40).map((y) => seen(x, y))),
-    ...spaced(frame.y, 6).map((y) => spaced(frame.x, 40).map((x) => seen(x, y))),
-  ];
-  const label = { kind: "text", style: "place", text: `lens, bent ${numberText(times)} times`, points: [[cx, cy]], anchor: "middle" };
-  return [...lines.map((points) => ({ kind: "line", style: "place", points, width: 1, faint: true, name: "lens" })), label];
-}
-
 function placeLayers(frame) {
   const layers = [];
   for (const name of ["friction_patch", "friction_patch_2"].filter(effectNamed)) {
@@ -89,7 +71,6 @@ function placeLayers(frame) {
     layers.push({ kind: "text", style: "place", text: `patch: ${numberText(ratio, 2)} × the friction`, points: [[x, y]], anchor: "middle" });
   }
   if (effectNamed("camera_seam")) layers.push(...seamLayers(frame));
-  if (effectNamed("camera_distortion")) layers.push(...lensLayers(frame));
   return layers;
 }
 

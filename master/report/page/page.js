@@ -98,11 +98,10 @@ const pageTrials = readTrials();
 if (pageTrials.length) {
   startDrives(pageTrials);
   startFloor(pageTrials);
-  startOutliers(pageTrials);
   startPoses(pageTrials);
   startResiduals(pageTrials, PAGE.where || []);
 } else {
-  for (const id of ["floor-plot", "outlier-plots", "drive-plots", "pose-plots", "residual-plots"]) {
+  for (const id of ["floor-plot", "drive-plots", "pose-plots", "residual-plots"]) {
     const place = document.getElementById(id);
     if (place) place.textContent = PAGE.without_trials;
   }
