@@ -145,14 +145,6 @@ TEST_F(ObjectiveFarm, RefusesToBeginOutsideOfTheRanges) {
   }
 }
 
-TEST_F(ObjectiveFarm, CheckAsksTwice) {
-  const Finished checked = gapfarm_command(
-      {"check", config("    answer['value'] += int.from_bytes(os.urandom(2), 'big')\n")});
-  EXPECT_THAT(checked.out, AllOf(HasSubstr("readable, but the program has two answers"),
-                                 HasSubstr("noisy = true")));
-  EXPECT_THAT(gapfarm_command({"check", config()}).out, HasSubstr(": fine"));
-}
-
 TEST_F(ObjectiveFarm, WhatWasLeftBeforeAnEarlierGenerationIsReplacedInSilence) {
   ASSERT_EQ(evolve(config(), "run", "4").exit_code, 0);
   const Finished resumed = gapfarm_command({"resume", folder_ / "run", "--generation", "2"});

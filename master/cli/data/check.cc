@@ -76,11 +76,6 @@ Status measure_evaluation(const Config& config, CliContext& context, Summary* su
     summary->evaluated = results.front();
     if (has_failed(results.front())) break;
   }
-  if (is_value(config.problem.fitness.kind) && !has_failed(*summary->evaluated)) {
-    ASSIGN_OR_RETURN(const auto again,
-                     farm->run(hash, {evaluation_task({0, 0, Genome()}, config.seed)}));
-    check_purity(*summary->evaluated, again.front(), &summary->sanity);
-  }
   if (took_s.size() > 1) took_s.erase(took_s.begin());
   summary->evaluation_s = median(took_s);
   const Problem& problem = config.problem;

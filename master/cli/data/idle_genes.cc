@@ -134,18 +134,4 @@ Result<std::vector<IdleGene>> idle_genes(Farm& farm, const Config& config) {
   return found;
 }
 
-void check_purity(const v1::TaskResult& first, const v1::TaskResult& again,
-                  std::vector<SanityFinding>* findings) {
-  const auto value = [](const v1::TaskResult& r) { return r.evaluate().SerializeAsString(); };
-  if (first.outcome() == again.outcome() && value(first) == value(again)) return;
-  findings->push_back(
-      {"impure",
-       "The program has two answers to one question, " +
-           format_number(first.evaluate().fitness(), 10) + " and " +
-           format_number(again.evaluate().fitness(), 10) + ".",
-       "It must answer by its parameters and seed alone: set noisy = true where it draws random "
-       "numbers, and draw them from the seed.",
-       Severity::kWarning});
-}
-
 }  // namespace gapfarm

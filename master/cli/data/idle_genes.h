@@ -7,7 +7,6 @@
 #include "common/base/result.h"
 #include "common/config/settings.h"
 #include "master/farm/farm.h"
-#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 
@@ -21,9 +20,5 @@ struct IdleGene {
 // a gene where all do something.  Those of a user's program that are there only sometimes are not
 // looked at, and none is found where nothing could be evaluated.  Errors: the farm's.
 Result<std::vector<IdleGene>> idle_genes(Farm& farm, const Config& config);
-
-// Adds "impure" where a program has two answers to one question.
-void check_purity(const v1::TaskResult& first, const v1::TaskResult& again,
-                  std::vector<SanityFinding>* findings);
 
 }  // namespace gapfarm

@@ -14,7 +14,6 @@ namespace gapfarm {
 
 std::string finding_phrase(const SanityFinding& finding) {
   static const std::map<std::string, std::string> phrases = {
-      {"impure", "the program has two answers to one question"},
       {"axes_swapped", "x and y are swapped"},
       {"axis_mirrored", "an axis is mirrored"},
       {"heading_flipped", "headings count clockwise"},
