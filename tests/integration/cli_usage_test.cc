@@ -308,48 +308,14 @@ TEST_F(CliCheck, CountsWhatARunWouldNeed) {
   const Finished text = gapfarm_command({"check", config});
   EXPECT_EQ(text.exit_code, 0) << text.err;
   EXPECT_THAT(text.out, HasSubstr("3 in 2 sessions"));
-  EXPECT_THAT(text.out, HasSubstr("conditions   2 distinct"));
+  EXPECT_THAT(text.out, HasSubstr("simulated an evaluation"));
   const Finished json = gapfarm_command({"check", config, "--json"});
-  EXPECT_THAT(json.out, HasSubstr("\"conditions\": 2"));
+  EXPECT_THAT(json.out, HasSubstr("\"motions\": "));
   EXPECT_THAT(json.out, HasSubstr("\"parameter\": \"friction\""));
   EXPECT_THAT(json.out, HasSubstr("\"seed\": 7"));
   // What it would cost: measured, and counted.
   EXPECT_THAT(json.out, HasSubstr("\"evaluation_s\": 0."));
   EXPECT_THAT(text.out, HasSubstr("an evaluation (measured here)"));
-}
-
-// Each push was its own, whatever the config says of commands.
-TEST_F(CliCheck, EveryPushIsAConditionOfItsOwn) {
-  const std::string config = folder_.write(
-      "push.toml",
-      "scenario = \"push\"\n[[pieces]]\nname = \"square\"\nmass = 0.1\nthickness = 0.01\n"
-      "corners = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]]\n"
-      "[genes]\nground_friction = [0.1, 1.0]\n");
-  std::string pushes = "session,trial,object,x0,y0,theta0,x1,y1,theta1\n";
-  std::string tips = "session,trial,t,x,y\n";
-  for (int i = 0; i < 3; ++i) {
-    const std::string key = "a," + std::to_string(i) + ",";
-    // The last two are the same push again.
-    const std::string y = i == 0 ? "0.001" : "0.002";
-    pushes += key + "square,0,0,0,0.01,0,0\n";
-    tips += key + "0,-0.03," + y + "\n" + key + "1,-0.01," + y + "\n";
-  }
-  folder_.write("tips.csv", tips);
-  const Finished json =
-      gapfarm_command({"check", config, "--trials", folder_.write("p.csv", pushes), "--json"});
-  EXPECT_EQ(json.exit_code, 0) << json.err;
-  EXPECT_THAT(json.out, HasSubstr("\"conditions\": 2"));
-}
-
-// An effect that looks at the time makes every time of a session a condition of its own.
-TEST_F(CliCheck, CountsConditionsByWhatTheEffectsLookAt) {
-  const std::string config = folder_.write("c.toml",
-                                           "[genes]\nfriction = [0.2, 1.0]\n"
-                                           "[genes.battery_sag]\nrate = [0.0, 0.01]\n");
-  const Finished text = gapfarm_command({"check", config, "--trials", trials_});
-  EXPECT_EQ(text.exit_code, 0) << text.err;
-  EXPECT_THAT(text.out, HasSubstr("conditions   3 distinct"));
-  EXPECT_THAT(text.out, HasSubstr("battery_sag"));
 }
 
 TEST_F(CliCheck, PointsAtWhatIsWrong) {

@@ -4,14 +4,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 
 #include "common/base/clock.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/problem/problem.h"
-#include "common/score/motion_model.h"
 #include "master/cli/data/idle_genes.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
@@ -34,7 +32,6 @@ struct Summary {
   std::size_t trials = 0;
   std::size_t sessions = 0;
   std::map<std::string, std::size_t> commands;
-  std::size_t conditions = 0;
   std::vector<std::string> effects;         // enabled: not neutral, or searched
   double evaluation_s = 0;                  // on one worker here, as measured
   std::optional<v1::TaskResult> evaluated;  // the config's own values; none: not looked at
@@ -120,49 +117,23 @@ std::vector<std::size_t> enabled_effects(const Problem& problem) {
   return enabled;
 }
 
-// Trials that differ in nothing that the enabled effects look at share one condition.
-std::size_t count_conditions(const Problem& problem, unsigned context) {
-  if (problem.windows()) return problem.runs.size();
-  const std::vector<DrivenCommand> driven = driven_commands(problem.log, problem.commands);
-  const std::vector<TrialContext> around = trial_contexts(problem.log, driven);
-  std::set<std::vector<double>> conditions;
-  for (std::size_t i = 0; i < driven.size(); ++i) {
-    const Trial& trial = problem.log.trials[i];
-    std::vector<double> key = {driven[i].left, driven[i].right, driven[i].duration_s};
-    // A push is nothing but where the piece lay and how the finger went.
-    if (!trial.tip.empty()) {
-      const auto piece = &problem.piece(trial.command) - problem.pieces.data();
-      key.insert(key.end(), {double(piece), trial.X_WS.x, trial.X_WS.y, trial.X_WS.theta});
-      for (const TipSample& tip : trial.tip) key.insert(key.end(), {tip.t_s, tip.x, tip.y});
-    }
-    if (context & kStartHeading) key.push_back(trial.X_WS.theta);
-    if (context & kStartPlace) key.insert(key.end(), {trial.X_WS.x, trial.X_WS.y});
-    if (context & kSessionTime) key.push_back(around[i].session_time_s);
-    if (context & kLastDirection) {
-      key.insert(key.end(), {double(around[i].last_left), double(around[i].last_right)});
-    }
-    if (context & kUnrecordedMove) key.push_back(around[i].moved ? 1 : 0);
-    conditions.insert(std::move(key));
-  }
-  return conditions.size();
-}
-
 Summary summarise(const Config& config) {
   const Problem& problem = config.problem;
   Summary summary;
   for (const Trial& trial : problem.log.trials) ++summary.commands[trial.command];
   summary.trials = problem.log.trials.size();
   summary.sessions = count_sessions(problem.log);
-  unsigned context = kNoContext;
   for (const std::size_t e : enabled_effects(problem)) {
-    const Effect& effect = problem.table().effects()[e];
-    context |= effect.context;
-    summary.effects.push_back(effect.name);
+    summary.effects.push_back(problem.table().effects()[e].name);
   }
   if (is_value(problem.fitness.kind)) return summary;
-  summary.conditions = count_conditions(problem, context);
   summary.sanity = log_warnings(problem, config.trial_files);
   return summary;
+}
+
+// At the config's own values: trials that differ in nothing that matters share theirs.
+unsigned motions_of(const Summary& summary) {
+  return summary.evaluated ? summary.evaluated->evaluate().conditions() : 0;
 }
 
 Json to_json(const Config& config, const Summary& summary, unsigned workers) {
@@ -190,7 +161,7 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
       {"trials", summary.trials},
       {"sessions", summary.sessions},
       {"commands", summary.commands},
-      {"conditions", summary.conditions},
+      {"motions", motions_of(summary)},
       {"evaluation_s", summary.evaluation_s},
       {"evaluated", evaluated},
       {"most_evaluations", genes.empty() ? 0 : most_evaluations(config.evolution, genes.size())},
@@ -320,8 +291,7 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   for (const auto& [command, count] : summary.commands) {
     text += " " + std::to_string(count) + " " + command;
   }
-  text += "\nconditions   " + std::to_string(summary.conditions) +
-          " distinct, each simulated once " + "an evaluation";
+  text += "\nmotions      " + std::to_string(motions_of(summary)) + " simulated an evaluation";
   text += "\neffects      ";
   text += summary.effects.empty() ? "none" : joined(summary.effects);
   text += "\nfitness      " + std::string(fitness_name(problem.fitness.kind)) +
