@@ -61,33 +61,6 @@ class Screen {
   std::string text_;
 };
 
-// A line of eight-level blocks, at most `width` of them, a blank where there is no value.  Longer
-// series are cut into equal stretches and show the last value of each.  The scale omits the
-// worst tenth of the values, so that a bad first generation does not flatten the rest.
-std::string sparkline(const std::vector<std::optional<double>>& values, std::size_t width,
-                      bool higher_is_better) {
-  static constexpr const char* kBlocks[] = {"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
-  const auto known = [](const std::optional<double>& v) { return v && std::isfinite(*v); };
-  std::vector<double> sorted;
-  for (const std::optional<double>& value : values) {
-    if (known(value)) sorted.push_back(*value);
-  }
-  std::ranges::sort(sorted);
-  if (sorted.empty() || width == 0) return {};
-  const std::size_t tenth = sorted.size() / 10;
-  const double low = sorted[higher_is_better ? tenth : 0];
-  const double high = sorted[sorted.size() - 1 - (higher_is_better ? 0 : tenth)];
-  const std::size_t columns = std::min(width, values.size());
-  std::string line;
-  for (std::size_t c = 0; c < columns; ++c) {
-    const std::optional<double>& value = values[(c + 1) * values.size() / columns - 1];
-    const double share =
-        high > low ? std::clamp((value.value_or(low) - low) / (high - low), 0.0, 1.0) : 0.5;
-    line += known(value) ? kBlocks[std::min(7, static_cast<int>(share * 8))] : " ";
-  }
-  return line;
-}
-
 void show_best(const RunStatus& status, Screen& screen) {
   if (!status.best_individual) return;
   const auto values = parse_json(status.best_individual->values);
@@ -183,8 +156,7 @@ void show_front(const RunFront& front, Screen& screen) {
                 format_number(front.nadir[m]), format_number(front.reference[m]));
   }
   if (!front.hypervolume.back()) return;
-  screen.line("hypervolume", "{}  {}{}", format_number(front.hypervolume.back()),
-              sparkline(front.hypervolume, 40, true), screen.styled(" by generation", "2"));
+  screen.line("hypervolume", "{}", format_number(front.hypervolume.back()));
 }
 
 void show_heartbeat(bool running, double age_s, Screen& screen) {
@@ -216,9 +188,6 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
     screen.line("", "best {}{}, mean {}, worst {}", format_number(status.best),
                 scores > 1 ? fmt::format(" (of {} noisy scores, the luckiest of all)", scores) : "",
                 format_number(status.mean), format_number(status.worst));
-    const std::size_t columns = std::min<std::size_t>(60, std::max(20u, console.width()) - 13);
-    screen.line("", "{}{}", sparkline(status.best_by_generation, columns, info.higher_is_better),
-                screen.styled(" best by generation", "2"));
   }
   show_front(status.front, screen);
   show_best(status, screen);
