@@ -32,7 +32,6 @@ struct DriveCommand : LongOptions {
   std::string log;  // blendersim's
   std::string out;
   unsigned runs = 200;
-  unsigned targets = 0;  // of the log; 0: all
   double coverage = 0.9;
   DriveSettings settings;
 };
@@ -98,31 +97,9 @@ Result<Task> read_task(const DriveCommand& command, const Model& model) {
     task.targets.emplace_back(xy[0], xy[1]);
   }
   if (command.log.empty()) return task;
-  ASSIGN_OR_RETURN(auto log, read_waypoint_log(command.log));
+  ASSIGN_OR_RETURN(const auto log, read_waypoint_log(command.log));
   task.start = log.path.front().pose;
   task.targets = log.targets;
-  if (command.targets > 0 && command.targets < task.targets.size()) {
-    // The real path ends where it came closest to the last target that is kept, after the one
-    // before.
-    task.targets.resize(command.targets);
-    std::size_t from = 0;
-    for (const Eigen::Vector2d& target : task.targets) {
-      std::size_t nearest = from;
-      double least = INFINITY;
-      bool left = false;
-      for (std::size_t i = from; i < log.path.size() && !left; ++i) {
-        const double d =
-            std::hypot(log.path[i].pose.x - target.x(), log.path[i].pose.y - target.y());
-        if (d < least) {
-          least = d;
-          nearest = i;
-        }
-        left = least < 0.2 && d > least + 0.1;
-      }
-      from = nearest;
-    }
-    log.path.resize(from + 1);
-  }
   task.real = floor_path(log.path, kSpacing_m);
   return task;
 }
@@ -297,7 +274,6 @@ SubcommandRun setup_drive(CLI::App& app) {
   app.add_option("--waypoints", command->waypoints, "Way-points in order, X,Y in m");
   app.add_option("--log", command->log,
                  "A blendersim way-point log: start, way-points and the real path come from it");
-  app.add_option("--targets", command->targets, "Only so many way-points of the log");
   app.add_option("--start", command->start, "X,Y,THETA in m and rad")->capture_default_str();
   app.add_option("--mined", command->mined,
                  "Trial logs that the mined motion model and constant velocities are fitted to");
