@@ -169,7 +169,6 @@ try {
     ["phone", file("example"), phone, 12],
     ["null", file("null"), {}, 12],
     ["hostile", file("hostile"), phone, 13],
-    ["strayed", file("strayed"), phone, 14],
     ["empty", file("empty"), {}, 0],
     ["unusable", file("unusable"), phone, 0],
     ["run", file("run"), {}, 13],

@@ -54,12 +54,6 @@ int main(int argc, char** argv) {
   hostile.headline = hostile.trials.front().session = hostile.trials.front().command = attack;
   hostile.where = {{attack, attack, attack, attack, 1, 1, 1, attack}};
   hostile.provenance = {{attack, attack}};
-  Diagnosis with_outliers = null_diagnosis();
-  with_outliers.residual.emplace();
-  with_outliers.residual->correction.outliers = {OutlierKind::kLate, 0.2, 0.1, 0.2, 0, 0, 0, 0};
-  for (std::size_t i = 0; i < with_outliers.trials.size(); ++i) {
-    with_outliers.residual->chances.push_back(i % 5 == 0 ? 0.98 : 0.02);
-  }
   Diagnosis empty;
   Diagnosis unusable;
   unusable.verdict = Verdict::kUnusable;
@@ -68,7 +62,6 @@ int main(int argc, char** argv) {
   for (const auto& [name, diagnosis] : {std::pair{"example", example_diagnosis()},
                                         {"null", null_diagnosis()},
                                         {"hostile", hostile},
-                                        {"strayed", with_outliers},
                                         {"empty", empty},
                                         {"unusable", unusable}}) {
     if (!write(folder + "/" + name + ".html", report_html(diagnosis))) {
