@@ -2,7 +2,7 @@
 # What each log says of a robot's own values, with 90 % intervals, in the words of its controller.
 #   scripts/floor_values.sh SETS OUT [SET...]
 # SETS holds folders with robot.toml and fit/, such as scripts/ground_sets.py makes of public logs; the
-# table of docs/ground.md is what this prints.  BIN: where the programs are (build/release/bin).
+# table of docs/evidence/ground.md is what this prints.  BIN: where the programs are (build/release/bin).
 set -euo pipefail
 sets=$1
 out=$2

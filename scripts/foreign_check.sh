@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Diagnoses logs of tracked robots that are not Bullet's: made by the planar simulator or by MuJoCo
 # (tests/planar, tests/mujoco; built with the tests, the second where GAPFARM_MUJOCO is on), judged by
-# `gapfarm blind-check`, reported as the tables of docs/diagnosis.md.
+# `gapfarm blind-check`, reported as the tables of docs/evidence/diagnosis.md.
 #
 #   scripts/foreign_check.sh OUT BIN [--engine planar|mujoco] [--nulls N] [--clear N] [--subtle N]
 #                            [--outside N] [--seed S] [--effects NAME...]

@@ -2,7 +2,7 @@
 # Asks what changed from one floor to another, and from one half of a log to the other.
 #   scripts/measure_changes.sh DATA OUT [PAIR...]
 # DATA holds dart/ (logs of the DART car), drive/ (a Warthog's), and the robot files of both in
-# wrong_robot/case01 and case11.  The table of docs/ground.md is what it prints.  BIN: where the
+# wrong_robot/case01 and case11.  The table of docs/evidence/ground_diagnosis.md is what it prints.  BIN: where the
 # programs are (build/release/bin).
 set -euo pipefail
 data=$(realpath "$1")

@@ -3,7 +3,7 @@
 # its own kinematics and constant velocity.
 #   scripts/measure_ground.sh SETS OUT [SET...]
 # SETS holds folders with robot.toml, fit/ and test/ (commands.csv and poses.csv in each), such as
-# scripts/ground_sets.py makes of public logs; the tables of docs/ground.md are what this prints.
+# scripts/ground_sets.py makes of public logs; the tables of docs/evidence/ground.md are what this prints.
 # BIN: where the programs are (build/release/bin).
 set -euo pipefail
 sets=$1

@@ -8,7 +8,7 @@ world poses of each are thinned to 5 a second, as a laser scans, and every pose 
 increment since the one before with noise (3 mm + 1 % of the way, 2 mrad + 1 % of the turn; Censi et
 al. 2013 print about these for scan matching) and what a matcher states of it, standard deviations half
 as large; nothing else of the poses is kept. The kinematics are fitted to each log (`gapfarm export
-ros`). The table of docs/ground.md is what this prints: the first of three draws of the noise, and counts over
+ros`). The table of docs/evidence/ground_diagnosis.md is what this prints: the first of three draws of the noise, and counts over
 all of them. BIN: where the programs are (build/release/bin).
 """
 import json

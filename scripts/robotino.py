@@ -5,7 +5,7 @@
 
 DATA holds runs.csv (file, floor, speed_m_s, direction_deg) and the logs that it names. A PAIR is
 BEFORE:AFTER, or AFTER alone for a diagnosis without a reference; each is a floor, with @SPEED for
-one speed and /even or /odd for every second direction. The tables of docs/ground.md are what it
+one speed and /even or /odd for every second direction. The tables of docs/evidence/ground_diagnosis.md are what it
 prints. BIN: where the programs are (build/release/bin).
 """
 import csv

@@ -41,7 +41,7 @@ inline constexpr double kCarMarkerShare = 0.3;  // 50 to 80 mm of a car of 0.17 
 inline constexpr double kCarMarkerYaw_rad = 0.02;
 
 // -- What a robot changes by from one log to the next, nobody having touched it: two halves of one
-// -- log of each robot of docs/ground.md, "What changed?".
+// -- log of each robot of docs/evidence/ground_diagnosis.md, "What changed between floors".
 inline constexpr double kSlipShare = 0.003;
 inline constexpr double kKeptTurnShare = 0.01;
 inline constexpr double kGripShare = 0.05;
