@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 
 #include "common/score/kinematic_body.h"
@@ -8,8 +9,8 @@
 namespace gapfarm {
 
 bool is_magnitude(std::string_view name) {
-  return name == "lag" || name == "back_emf" || name == "drag" || name == "coulomb" ||
-         name == "cornering";
+  return name == "lag" || name == "back_emf" || name == "drag" ||
+         name == "coulomb" || name == "cornering";
 }
 
 void Kinematics::add(std::string name, double value) {
@@ -21,6 +22,17 @@ void Kinematics::add(std::string name, double value) {
 Eigen::Index Kinematics::index(std::string_view name) const {
   const auto found = std::ranges::find(names, name);
   return found == names.end() ? -1 : found - names.begin();
+}
+
+void scale_side(double sign, double ratio, RobotSteering* steering) {
+  if (steering->table.empty() && steering->gain != 0) {
+    // As it is without one, up to a quarter of a turn.
+    const double across = std::numbers::pi / 2 / std::abs(steering->gain);
+    steering->table = {{-across, -across}, {0, 0}, {across, across}};
+  }
+  for (RobotSteering::Point& p : steering->table) {
+    if (p.command * sign > 0) p.angle_rad *= ratio;
+  }
 }
 
 Kinematics nominal_kinematics(const GroundRobot& robot) {

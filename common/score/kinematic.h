@@ -45,7 +45,8 @@ Eigen::Matrix2Xd asked_by_channels(const GroundRobot& robot);
 std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinematics);
 
 // The same of windows that are no problem's.  Beside those of nominal_kinematics() these names may
-// stand: "travel" (ratio of all wheels), "steering_left" and "_right" (ratio of the table's angles
+// stand: "travel" (ratio of all wheels), radius_row() of a
+// wheel, "steering_left" and "_right" (ratio of the angles
 // that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain), "dead_band" (the
 // command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of the command lost
 // a minute), "drift" (s that the clock of whoever logs the commands loses a second), "rate" (the

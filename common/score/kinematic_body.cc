@@ -285,12 +285,8 @@ void KinematicBody::put(const std::string& name, double value) {
   if (name == "turn") turn_ *= value;
   if (name == "arm") turn_ /= value;
   if (name == "steering_gain") robot_.steering.gain *= value;
-  if (name == "steering_left" || name == "steering_right") {
-    const double sign = name == "steering_left" ? 1 : -1;
-    for (RobotSteering::Point& p : robot_.steering.table) {
-      if (p.command * sign > 0) p.angle_rad *= value;
-    }
-  }
+  if (name == "steering_left") scale_side(1, value, &robot_.steering);
+  if (name == "steering_right") scale_side(-1, value, &robot_.steering);
   if (name == "wheelbase") *robot_.controller.wheelbase_m *= value;
   if (name == "power") t.gain *= value;
   if (name == "dead_band") robot_.motors.dead_band = value;

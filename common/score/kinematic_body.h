@@ -95,6 +95,9 @@ class OmniWheels {
 // wheels in one line.
 std::optional<double> skid_friction_ratio(const GroundRobot& robot, double separation_ratio);
 
+// The angles that commands of this sign ask for; what has no table is given one.
+void scale_side(double sign, double ratio, RobotSteering* steering);
+
 // The robot and the gains of its motion at some values.
 class KinematicBody {
  public:

@@ -109,12 +109,10 @@ class Catalogue {
           {{"wheelbase", 1, kSteeringGainShare, "ratio", "-"}});
     value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
           {row("understeer")});
-    if (!robot_.steering.table.empty()) {
-      value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
-            {{"steering_left", 1, kSteeringGainShare, "ratio", "-"}});
-      value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the right",
-            {{"steering_right", 1, kSteeringGainShare, "ratio", "-"}});
-    }
+    value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
+          {{"steering_left", 1, kSteeringGainShare, "ratio", "-"}});
+    value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the right",
+          {{"steering_right", 1, kSteeringGainShare, "ratio", "-"}});
   }
 
   void motors() {

@@ -43,6 +43,13 @@ coulomb = 0.0
 cornering = 0.0
 )";
 
+inline constexpr const char* kTricycle = R"(drive = "tricycle"
+commands = ["speed", "steering"]
+wheelbase = 0.3
+wheel_radius = 0.05
+lag = 0.1
+)";
+
 inline constexpr const char* kOmni = R"(drive = "omni"
 commands = ["w1", "w2", "w3"]
 robot_radius = 0.2
@@ -81,6 +88,7 @@ inline CommandRow row_at(const GroundRobot& robot, int run, int second, double p
     return {t, {push * (0.3 + 0.1 * std::sin(0.8 * t + run)), 0.8 * std::sin(1.9 * t + 2 * run)}};
   }
   const double a = 4 * std::sin(1.7 * t + run), b = 4 * std::cos(2.3 * t + run);
+  if (robot.command == CommandKind::kSpeedSteering) return {t, {5 + a, 0.1 * b}};
   if (robot.channels.size() == 3) return {t, {a, b, 3 * std::sin(0.9 * t + 2 * run)}};
   return {t, {5 + a, 5 + b}};
 }
