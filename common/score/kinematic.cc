@@ -13,6 +13,8 @@ bool is_magnitude(std::string_view name) {
          name == "coulomb" || name == "cornering";
 }
 
+std::string radius_row(const RobotWheel& wheel) { return "wheels." + wheel.name + ".radius"; }
+
 void Kinematics::add(std::string name, double value) {
   names.push_back(std::move(name));
   values.conservativeResize(values.size() + 1);

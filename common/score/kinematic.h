@@ -29,6 +29,9 @@ struct Kinematics {
   }
 };
 
+// The name of the ratio of one wheel's radius, "wheels.front_left.radius".
+std::string radius_row(const RobotWheel& wheel);
+
 // Whether a value slows down by its size, whatever its sign (lags and drags): fits keep it at 0 or
 // above.
 bool is_magnitude(std::string_view name);

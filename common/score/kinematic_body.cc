@@ -264,6 +264,9 @@ void KinematicBody::stand_on(const RobotPlace& at) const {
 void KinematicBody::put(const std::string& name, double value) {
   RobotThrottle& t = robot_.throttle;
   if (is_magnitude(name)) value = std::abs(value);
+  for (RobotWheel& w : robot_.wheels) {
+    if (name == radius_row(w)) *w.radius_m *= value;
+  }
   if (name == "left") left_ *= value;
   if (name == "right") right_ *= value;
   if (name == "travel" && is_holonomic(robot_)) {

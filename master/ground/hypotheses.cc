@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/score/kinematic.h"
 #include "master/ground/fit/scans.h"
 #include "master/ground/fit/window_set.h"
 #include "master/ground/tolerances.h"
@@ -66,6 +67,11 @@ class Catalogue {
       if (!changes_) {
         value("wheel_radius", {"speed_gain"}, "the radius of all wheels",
               {{"travel", 1, share, "ratio", "-"}});
+        for (const RobotWheel& w : robot_.wheels) {
+          if (!w.driven) continue;
+          value("wheel_radius", {"motor_asymmetry"}, "the radius of wheel " + w.name,
+                {{radius_row(w), 1, share, "ratio", "-"}});
+        }
       }
       value("wheel_slip", {"floor", "roller_drag"}, "how far the robot goes of its wheels' way",
             {row("traction")});

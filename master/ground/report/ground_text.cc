@@ -26,6 +26,9 @@ std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Est
   };
   const auto& k = robot.controller;
   const double base = row.nominal;
+  for (const RobotWheel& w : robot.wheels) {
+    if (row.name == radius_row(w)) return ratio(row.name, *w.radius_m, " m");
+  }
   if (row.name == "left" || row.name == "right") {
     return ratio("wheels." + row.name + ".radius", side_radius_m(robot, row.name), " m");
   }
