@@ -207,6 +207,11 @@ void Rows::motors() {
                          : "first-order response of the wheels",
       [](GroundRobot& robot, double v) { robot.motors.lag_s = v; });
   if (is_throttled(robot_)) return;
+  if (is_steered(robot_)) {
+    add("drive_lag", "s", 0, std::max(1.0, 2 * m.drive_lag_s), m.drive_lag_s,
+        "first-order response of the wheels",
+        [](GroundRobot& robot, double v) { robot.motors.drive_lag_s = v; });
+  }
   add(
       "acceleration_limit", "m/s^2", 0.01, kNoRamp_m_s2,
       m.acceleration_limit_m_s2.value_or(kNoRamp_m_s2), "of the wheels' surface",

@@ -152,6 +152,7 @@ Status check_robot(const GroundRobot& robot) {
   RETURN_IF_ERROR(positive("friction_ratio", robot.friction_ratio));
   RETURN_IF_ERROR(check_channels(robot));
   if (!(robot.motors.lag_s >= 0)) return Error{"lag is below 0 s"};
+  if (!(robot.motors.drive_lag_s >= 0)) return Error{"drive_lag is below 0 s"};
   return {};
 }
 

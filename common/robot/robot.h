@@ -89,6 +89,7 @@ struct RobotMotors {
   bool closed_loop = true;  // false: an open duty, whose speed the battery sets
   double delay_s = 0;       // dead time; below 0 where poses are late
   double lag_s = 0;         // first order, of the wheels; of a car: of its steering
+  double drive_lag_s = 0;   // of a car: first order, of the wheels
   std::optional<double> acceleration_limit_m_s2;  // of the wheels' surface
   double dead_band = 0;                           // in the command's own unit
   std::optional<double> command_timeout_s;        // without a new row the wheels stop

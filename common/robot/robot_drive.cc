@@ -72,7 +72,7 @@ RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> com
     : robot_(robot),
       track_(commands, robot.channels.size(), robot.motors.command_timeout_s),
       steered_(is_steered(robot)),
-      lag_in_wheels_(!steered_),
+      wheel_lag_s_(steered_ ? robot.motors.drive_lag_s : robot.motors.lag_s),
       targets_(robot.wheels.size(), 0.0),
       limited_(robot.wheels.size(), 0.0),
       speeds_(robot.wheels.size(), 0.0),
@@ -215,8 +215,8 @@ double RobotDrive::follow(std::size_t i, double target, double dt_s) {
         wanted + (limited_[i] - wanted) / 2 * std::min(1.0, std::abs(wanted - limited_[i]) / most);
   }
   limited_[i] = wanted;
-  const double lag = robot_.motors.lag_s;
-  if (!lag_in_wheels_ || lag <= 0) {
+  const double lag = wheel_lag_s_;
+  if (lag <= 0) {
     speeds_[i] = wanted;
     return input;
   }

@@ -63,7 +63,8 @@ class RobotDrive {
   double next_change(double t_s, double until_s) const;
   // Whether what wheels do depends on when a command came, beside how long it lasted.
   bool remembers() const {
-    return robot_.motors.lag_s > 0 || robot_.motors.acceleration_limit_m_s2.has_value();
+    return robot_.motors.lag_s > 0 || wheel_lag_s_ > 0 ||
+           robot_.motors.acceleration_limit_m_s2.has_value();
   }
   // Whether the wheels stand and are commanded to; and when the command differs.
   bool stands() const { return stands_; }
@@ -87,7 +88,7 @@ class RobotDrive {
   const GroundRobot& robot_;
   CommandTrack track_;
   bool steered_;
-  bool lag_in_wheels_;
+  double wheel_lag_s_;
   std::vector<int> channel_;  // of each wheel; -1: none
   int v_ = -1, omega_ = -1, vy_ = -1, throttle_ = -1, speed_ = -1, steering_ = -1;
   std::vector<double> targets_;  // m/s of each wheel

@@ -52,6 +52,7 @@ void top_rows(Visitor& v, Robot& robot) {
   v.read("closed_loop", m.closed_loop);
   v.read("delay", m.delay_s, -60, 60, "s");
   v.read("lag", m.lag_s, 0, 60, "s");
+  v.read("drive_lag", m.drive_lag_s, 0, 60, "s");
   v.read("acceleration_limit", m.acceleration_limit_m_s2, 1e-3, 1e4, "m/s^2");
   v.read("dead_band", m.dead_band, 0, 1e4);
   v.read("cmd_vel_timeout", m.command_timeout_s, 1e-3, 1e4, "s");

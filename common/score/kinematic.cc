@@ -9,7 +9,7 @@
 namespace gapfarm {
 
 bool is_magnitude(std::string_view name) {
-  return name == "lag" || name == "back_emf" || name == "drag" ||
+  return name == "lag" || name == "drive_lag" || name == "back_emf" || name == "drag" ||
          name == "coulomb" || name == "cornering";
 }
 
@@ -54,7 +54,7 @@ Kinematics nominal_kinematics(const GroundRobot& robot) {
       add({{"gain", t.gain}, {"zero", t.zero}, {"back_emf", t.back_emf}});
       add({{"drag", t.drag}, {"coulomb", t.coulomb}, {"cornering", t.cornering}});
     } else {
-      add({{"ahead", 1}});
+      add({{"ahead", 1}, {"drive_lag", robot.motors.drive_lag_s}});
     }
   }
   add({{"lag", robot.motors.lag_s}, {"delay", robot.motors.delay_s}});

@@ -314,6 +314,7 @@ void KinematicBody::put(const std::string& name, double value) {
   if (name == "coulomb") t.coulomb = value;
   if (name == "cornering") t.cornering = value;
   if (name == "lag") robot_.motors.lag_s = value;
+  if (name == "drive_lag") robot_.motors.drive_lag_s = value;
   if (name == "delay") robot_.motors.delay_s = value;
   constexpr const char* kBy[] = {"_by_turn", "_by_side", "_by_turn_speed"};
   for (Eigen::Index k = 0; k < offsets_.cols(); ++k) {

@@ -16,6 +16,12 @@ namespace {
 
 double reach_of(const GroundRobot& robot) { return std::max(wheel_reach_m(robot), 1e-3); }
 
+// Whether driven wheels of a steered robot follow their commands with a lag of their own.
+bool moves_later(const GroundRobot& robot) {
+  return is_steered(robot) && !is_throttled(robot) &&
+         (!robot.measured || robot.motors.drive_lag_s > 0);
+}
+
 // Of what does not depend on the fit that it is offered beside.
 auto from_scan(Eigen::VectorXd (*scan)(const WindowFitter&, const std::vector<FitRow>&,
                                        const Eigen::VectorXd&)) {
@@ -136,6 +142,10 @@ class Catalogue {
       value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
             is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
     }
+    if (moves_later(robot_)) {
+      value("motor_lag", {"acceleration_limit"}, "the lag of the driven wheels",
+            {row("drive_lag")});
+    }
     if (is_throttled(robot_)) {
       value("throttle_gain", {"payload", "battery_voltage"}, "the acceleration a unit of throttle",
             {{"power", 1, kPowerShare, "ratio", "-"}});
@@ -251,6 +261,8 @@ std::vector<KinematicRow> rows_of(const GroundRobot& robot, bool changes) {
       put("cornering", t.cornering, 0.02, "-");
     } else {
       rows.push_back({"ahead", 1, sd(kRadiusShare, kSlipShare), "ratio", "-"});
+      if (moves_later(robot))
+        rows.push_back({"drive_lag", robot.motors.drive_lag_s, kLag_s, "tau", "s", true});
     }
   } else {
     const double radius = sd(skids(robot) ? kSkidRadiusShare : kRadiusShare, kSlipShare);

@@ -85,6 +85,7 @@ inline constexpr PlausibleError kPlausibleErrors[] = {
     {"coulomb", 0.5, "m/s^2"},
     {"cornering", 0.5, "-"},
     {"lag", 0.3, "s"},
+    {"drive_lag", 0.3, "s"},
     {"delay", 1.5, "s"},
     {"drift", 0.003, "s/s"},
     {"rate", 0.003, "s/s"},

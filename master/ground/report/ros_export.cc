@@ -148,6 +148,7 @@ std::vector<std::string> ros_remarks(const ReportedValues& reported) {
        "rad"},
       {"delay", "from a command to its pose", "s"},
       {"lag", "first-order lag", "s"},
+      {"drive_lag", "first-order lag of the driven wheels", "s"},
       {"marker_x", "the tracked point, ahead", "m"},
       {"marker_y", "the tracked point, to the left", "m"},
       {"marker_yaw", "the tracked point's heading", "rad"},

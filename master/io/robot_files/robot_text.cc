@@ -20,9 +20,9 @@ std::vector<std::string> identified_by_driving(const GroundRobot& robot) {
   for (const RobotWheel& w : robot.wheels) {
     if (w.driven && groups.insert(w.group).second) keys.push_back("wheels." + w.group + ".radius");
   }
-  static const std::vector<std::string> kOfCars = {"steering.offset", "steering.gain",
-                                                   "understeer",      "friction",
-                                                   "throttle.gain",   "throttle.drag"};
+  static const std::vector<std::string> kOfCars = {
+      "steering.offset", "steering.gain", "understeer", "friction",
+      "throttle.gain",   "throttle.drag", "drive_lag"};
   static const std::vector<std::string> kByDriveKind[] = {
       {"wheel_separation"},
       {"friction_ratio", "friction", "creep"},

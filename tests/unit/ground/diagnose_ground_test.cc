@@ -99,6 +99,7 @@ TEST(DiagnoseGround, FindsOneOfManyThings) {
       {kOmni, "turn", 1 / 1.06, "wheel_separation", "ratio", 0.06},
       {kOmni, "wheels.w2.radius", 0.95, "wheel_radius", "ratio", -0.05},
       {kTricycle, "steering_left", 0.9, "steering_asymmetry", "ratio", -0.1},
+      {kTricycle, "drive_lag", 0.2, "motor_lag", "tau", 0.2},
       {kCar, "steering_offset", 0.03, "steering_offset", "angle", 0.03},
       {kCar, "steering_gain", 1.15, "steering_gain", "ratio", 0.15},
   };

@@ -1,5 +1,6 @@
 // Names that are not worth one beside those that came after them.
 #include "common/base/ranges.h"
+#include "master/ground/diagnose_ground.h"
 #include "master/ground/search.h"
 #include "tests/unit/ground/driven_log.h"
 
@@ -60,6 +61,14 @@ TEST(Stands, OnlyWhatIsWorthItsNameBesideTheOthers) {
   EXPECT_EQ(search.chain.size(), 2u);
   EXPECT_NEAR(search.fit.objective, alone.objective, 0.01);
   EXPECT_NEAR(search.fit.values[row_index(search.fit.rows, "separation")], 1.06, 0.01);
+}
+
+// What a car's wheels lag by within a well-kept file's tolerance is no ramp of their speed.
+TEST(Stands, ALagOfDrivenWheelsIsNoRamp) {
+  const GroundRobot robot = robot_of(kTricycle);
+  const auto found = diagnose_ground(robot, driven(robot, off_by({"drive_lag"}, {0.03})), {});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_TRUE(found->diagnosis.effects.empty()) << found->diagnosis.headline;
 }
 
 }  // namespace
