@@ -282,16 +282,16 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
   search->free_fit = fitter.fit(all, {}, search->fit.values);
   WindowFit moved = fit_held_out(fitter, search->fit.rows, search->fit.values);
   const WindowFit named = search->chain.back();
+  const bool far = moved_far(fitter, search->fit);
   // They may move, and need not.
-  const bool within =
-      search->reference && !moved_far(fitter, search->fit) && mean(moved.nats) > mean(named.nats);
+  const bool within = search->reference && !far && mean(moved.nats) > mean(named.nats);
   const WindowFit& before = within ? moved : named;
   WindowFit best = before;
   std::swap(best, search->best);
   std::string what = "what is named";
   std::swap(what, search->best_of_all);
   if (!best.nats.empty()) keep_if_best(search, std::move(best), std::move(what));
-  keep_if_best(search, moved, "small moves of all values");
+  keep_if_best(search, moved, far ? "moves of all values" : kSmallMoves);
   keep_if_best(search, fit_held_out(fitter, all, search->free_fit.values), "every value free");
   if (search->smooth) {
     keep_if_best(search, search->smooth->held_out, "a correction by " + search->smooth->depends_on);

@@ -29,6 +29,9 @@ inline constexpr const char* kFaultStage = "look for faults of the log";
 inline constexpr const char* kCatalogueStage = "try the catalogue";
 inline constexpr const char* kRestStage = "measure what is left";
 
+// What may be best of all that was tried: no value far off what a well-kept file has.
+inline constexpr const char* kSmallMoves = "small moves of all values";
+
 struct Offer {
   std::size_t hypothesis = 0;
   double gain = 0;         // nats over all windows, beyond what was chosen before

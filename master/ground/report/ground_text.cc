@@ -214,9 +214,10 @@ std::string verdict_reason(const GroundFigures& figures) {
     const std::string what = figures.best_of_all.empty() ? "" : ", " + figures.best_of_all + ",";
     return fmt::format(
         "The best of what was tried{} closes another {} on stretches that were not fitted, and "
-        "{:.2g} (residuals 10 % smaller) is tolerated: something moves the robot that is not "
-        "named.",
-        what, closes, kToleratedGap);
+        "{:.2g} (residuals 10 % smaller) is tolerated: {}.",
+        what, closes, kToleratedGap,
+        figures.best_of_all == kSmallMoves ? "no value need be off by much, but many by a little"
+                                           : "something moves the robot that is not named");
   }
   return fmt::format(
       "The best of what was tried would close another {} on stretches that were not fitted: these "
@@ -310,6 +311,9 @@ std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
   if (diagnosis.effects.empty()) {
     if (diagnosis.verdict == Verdict::kNone) {
       return "Keep what you have; only more runs, or other drives, could show more.";
+    }
+    if (search.best_of_all == kSmallMoves && !search.windows.simulated) {
+      return "Fit all values at once: gapfarm export ros, of the config, prints them.";
     }
     return search.smooth ? "Look at how errors vary with the " + search.smooth->covariate + "."
                          : "Look first at the windows that miss most, below.";

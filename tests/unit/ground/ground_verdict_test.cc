@@ -47,6 +47,15 @@ TEST(GroundVerdict, AGainWhoseIntervalHoldsZeroIsNoName) {
   EXPECT_TRUE(may_be_named({0.5, 0.1, 1}));
 }
 
+TEST(GroundVerdict, ManySmallMovesAreNothingUnnamed) {
+  GroundFigures figures = left(0.4, 0.5, 0.6);
+  figures.best_of_all = "every value free";
+  EXPECT_NE(verdict_reason(figures).find("not named"), std::string::npos);
+  figures.best_of_all = kSmallMoves;
+  EXPECT_NE(verdict_reason(figures).find("many by a little"), std::string::npos);
+  EXPECT_EQ(verdict_reason(figures).find("not named"), std::string::npos);
+}
+
 // Runs that miss by far more than others are no clean bill of health, whatever could be closed.
 TEST(GroundVerdict, AnOddRunIsNotNothing) {
   GroundFigures figures = left(0, 0, 0);
