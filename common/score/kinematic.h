@@ -48,23 +48,22 @@ Eigen::Matrix2Xd asked_by_channels(const GroundRobot& robot);
 std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinematics);
 
 // The same of windows that are no problem's.  Beside those of nominal_kinematics() these names may
-// stand: "travel" (ratio of all wheels), radius_row() of a
-// wheel, "steering_left" and "_right" (ratio of the angles
-// that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain), "dead_band" (the
-// command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of the command lost
-// a minute), "drift" (s that the clock of whoever logs the commands loses a second), "rate" (the
-// same of the robot's own clock, by which it also drives), "grip" (of cars: logarithm of the
-// acceleration to the side that the floor holds, m/s^2) with "slip_angle" (rad, of the rear axle
-// there; in place of the file's understeer) and "grip_shape" (logarithm of the power p in 1 / (1 +
-// share^p)^(1/p), how sharply curvature falls where the grip ends), "pose_scale" and "aspect" (of
-// the tracker: all that it reports, its y over its x); "traction" (of omni and mecanum wheels: what
-// a robot that does not turn goes of its wheels' way, since rollers resist being rolled aside;
-// loaded wheels pull and drag more) with "load_x" and "load_y" (m: where the weight stands on
-// them); "edge_angle" (rad), "edge_offset" (m) and "edge_ratio": two floors.  Beyond the line of
-// points p with p (cos angle, sin angle) = offset, from the origin along the tracker's axes, a
-// wheel travels ratio times as far, of omni and mecanum wheels with that of the traction, and a
-// throttle's resist rolling by 1 - ratio of the weight more; "patch_x", "_y", "_radius" (m) and
-// "patch_ratio": the same within a circle; "known_" before these names: of a second edge and
+// stand: "travel" (ratio of all wheels), radius_row() of a wheel, "steering_left" and "_right"
+// (ratio of the angles that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain),
+// "dead_band" (the command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of
+// the command lost a minute), "drift" (s that the clock of whoever logs the commands loses a
+// second), "rate" (the same of the robot's own clock, by which it also drives), "grip" (of cars:
+// logarithm of the acceleration to the side that the floor holds, m/s^2) with "slip_angle" (rad, of
+// the rear axle there; in place of the file's understeer) and "grip_shape" (logarithm of the power
+// p in 1 / (1 + share^p)^(1/p), how sharply curvature falls where the grip ends), "pose_scale" and
+// "aspect" (of the tracker: all that it reports, its y over its x); "traction" (of omni and mecanum
+// wheels: what a robot that does not turn goes of its wheels' way, since rollers resist being
+// rolled aside; loaded wheels pull and drag more) with "load_x" and "load_y" (m: where the weight
+// stands on them); "edge_angle" (rad), "edge_offset" (m) and "edge_ratio": two floors.  Beyond the
+// line of points p with p (cos angle, sin angle) = offset, from the origin along the tracker's
+// axes, a wheel travels ratio times as far, of omni and mecanum wheels with that of the traction,
+// and a throttle's resist rolling by 1 - ratio of the weight more; "patch_x", "_y", "_radius" (m)
+// and "patch_ratio": the same within a circle; "known_" before these names: of a second edge and
 // circle; "downhill_x" and "_y" (of the tracker's frame): how much farther than its wheels' way a
 // robot goes downhill, over how far they roll; of robots that skid over how far turns drag their
 // wheels; of a throttle the slope, sin(angle), by which gravity drives it; "ahead_by_turn",

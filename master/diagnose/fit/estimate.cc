@@ -17,8 +17,8 @@
 namespace gapfarm {
 namespace {
 
-// One unit of a coordinate: of a parameter's range, or of its logarithm.
-constexpr double kUnit = 0.1;
+// One unit of a coordinate: of a parameter's range; of its logarithm.
+constexpr double kUnitOfRange = 0.1, kUnitOfLogarithm = 0.15;
 
 // Of the fit's parameter `k`, whose valleys run along products and quotients: a nap drags as far
 // where the floor grips as much better.
@@ -30,7 +30,7 @@ infer::Coordinate coordinate_of(const Study& study, const JointFit& fit, std::si
   const Parameter& row = (*study.table)[c.row];
   const bool turns = row.key.ends_with(".direction");
   c.kind = turns ? Kind::kAngle : row.lower >= 0 || base ? Kind::kLogarithm : Kind::kLinear;
-  c.size = c.kind == Kind::kLogarithm ? kUnit : kUnit * (row.upper - row.lower);
+  c.size = c.kind == Kind::kLogarithm ? kUnitOfLogarithm : kUnitOfRange * (row.upper - row.lower);
   if (base) {
     c.prior_sd = study.base_parameters[k].prior_log_sd / c.size;
     c.centre = std::log(study.base.at(c.row)) / c.size;
