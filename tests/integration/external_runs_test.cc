@@ -116,9 +116,10 @@ TEST_F(ExternalRuns, AProgramThatMisbehavesStopsNoRun) {
   }
 }
 
+// Another worker has to be there before the last generation.
 TEST_F(ExternalRuns, WhatAnswersDifferentlyTwiceIsNamed) {
-  const Finished finished =
-      evolve(config("    extra = os.getpid() * 1e-9\n", "[farm]\naudit_share = 1.0\n"), "run", "2");
+  const Finished finished = evolve(
+      config("    extra = os.getpid() * 1e-9\n", "[farm]\naudit_share = 1.0\n"), "run", "40");
   ASSERT_EQ(finished.exit_code, 0) << finished.err;
   const json incidents = status("run")["incidents"];
   ASSERT_FALSE(incidents.empty());
