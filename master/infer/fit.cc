@@ -17,6 +17,7 @@ namespace {
 constexpr int kMostHalvings = 3;
 constexpr double kFirstDifference = 0.2;  // of a coordinate
 constexpr double kLeastDifference = 0.01, kMostDifference = 1.5;
+constexpr double kShareOfSides = 0.3;  // of a difference, to either side
 constexpr double kLeastDamping = 1e-3;
 // Shares of a difference, in the order in which they are tried.
 constexpr double kTries[] = {1, -1, 0.1, -0.1};
@@ -89,8 +90,12 @@ double Fitter::best_scale(const Eigen::VectorXd& z, std::optional<std::size_t> w
 }
 
 Fitter::Fitter(const Forward& forward, const Observations& observations, Space space,
-               const Forward* coarse)
-    : forward_(forward), observations_(observations), space_(std::move(space)), coarse_(coarse) {}
+               const Forward* coarse, Sides sides)
+    : forward_(forward),
+      observations_(observations),
+      space_(std::move(space)),
+      coarse_(coarse),
+      sides_(sides) {}
 
 Eigen::Vector3d Fitter::residual(std::size_t i, const Pose& end) const {
   return observations_.whitener[i] * local_difference(end, observations_.measured[i]);
@@ -202,6 +207,35 @@ Status Fitter::move_each(const Forward& forward, const Eigen::VectorXd& from, do
   return {};
 }
 
+// The same of those that can be moved both ways, by kShareOfSides of their differences.
+Status Fitter::move_both_ways(const Forward& forward, std::vector<Eigen::Index>* open,
+                              Fit* fit) const {
+  std::vector<PredictionRequest> requests;
+  for (const Eigen::Index k : *open) {
+    for (const double side : {-kShareOfSides, kShareOfSides}) {
+      Eigen::VectorXd u = fit->u;
+      u[k] = std::clamp(u[k] + side * fit->differences[k], space_.lower()[k], space_.upper()[k]);
+      requests.push_back({space_.values(u), observations_.asked});
+    }
+  }
+  ASSIGN_OR_RETURN(const auto ends, forward(requests));
+  std::size_t next = 0;
+  std::erase_if(*open, [&](Eigen::Index k) {
+    const auto& below = ends[next++];
+    const auto& above = ends[next++];
+    const double whole = 2 * kShareOfSides * fit->differences[k];
+    const bool inside =
+        fit->u[k] - whole / 2 >= space_.lower()[k] && fit->u[k] + whole / 2 <= space_.upper()[k];
+    if (!inside || !below || !above) return false;
+    Eigen::VectorXd change = whitened(*above) - whitened(*below);
+    const double moved = std::sqrt(change.squaredNorm() / static_cast<double>(change.size()));
+    bound_jumps(kFarDeviations * std::max(moved, 2 * kShareOfSides * fit->scale), &change);
+    fit->slopes.col(k) = change / whole;
+    return true;
+  });
+  return {};
+}
+
 Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
   const Eigen::Index dimensions = space_.dimensions();
   if (fit->differences.size() != dimensions) {
@@ -227,6 +261,7 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
       from = whitened(*there.front());
     }
   }
+  if (sides_ == Sides::kBoth) RETURN_IF_ERROR(move_both_ways(*forward, &open, fit));
   for (const double share : kTries) {
     RETURN_IF_ERROR(move_each(*forward, from, share, &open, fit));
   }

@@ -64,6 +64,10 @@ struct Fit {
   bool settled = false;
 };
 
+// On which differences are taken.  One leads on; two, nearer to the point, say what a fit knows:
+// the bend of a valley passes for a slope across it in differences of one side.
+enum class Sides { kOne, kBoth };
+
 // Of a step from a fit, to second order.
 struct Normal {
   Eigen::MatrixXd matrix;
@@ -80,7 +84,7 @@ class Fitter {
   // `coarse`: predictions for slopes alone, which are taken between two of them; null: `forward`.
   // REQUIRES: all outlive it.
   Fitter(const Forward& forward, const Observations& observations, Space space,
-         const Forward* coarse = nullptr);
+         const Forward* coarse = nullptr, Sides sides = Sides::kOne);
 
   // The score at a point; -infinity where it cannot be simulated.
   Result<Fit> start(const Eigen::VectorXd& u) const;
@@ -132,12 +136,14 @@ class Fitter {
   }
   Status move_each(const Forward& forward, const Eigen::VectorXd& from, double share,
                    std::vector<Eigen::Index>* open, Fit* fit) const;
+  Status move_both_ways(const Forward& forward, std::vector<Eigen::Index>* open, Fit* fit) const;
   Status step(Fit* fit) const;
 
   const Forward& forward_;
   const Observations& observations_;
   Space space_;
   const Forward* coarse_;
+  Sides sides_;
 };
 
 }  // namespace gapfarm::infer

@@ -208,7 +208,7 @@ std::map<std::string, double> values_at(const Study& study, const Regression& ot
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<EffectCandidate>& effects, const Overrides& start,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds,
-                             Loss loss) {
+                             Loss loss, infer::Sides sides) {
   JointFit fit;
   fit.at = start;
   fit.parameters = parameters_of(study, start, effects, base, &fit.base_parameters);
@@ -229,7 +229,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   const infer::Space space = space_of(study, fit, nuisances.cols());
   const infer::Forward coarse = coarse_forward(predictor, study);
   const bool is_coarser = coarser(predictor, study, start).has_value();
-  const infer::Fitter fitter(forward, observations, space, is_coarser ? &coarse : nullptr);
+  const infer::Fitter fitter(forward, observations, space, is_coarser ? &coarse : nullptr, sides);
   Eigen::VectorXd u = space.from(start);
   u.head(nuisances.cols()) = beside_nuisances(study, fit, observations).u;
   ASSIGN_OR_RETURN(auto found, fitter.start(u));
@@ -241,7 +241,9 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
     found.differences[nuisances.cols() + at] = step_of((*study.table)[p.row], p.value) / units[at];
   }
   RETURN_IF_ERROR(fitter.improve(&found, rounds));
-  if (found.slopes.size() == 0) RETURN_IF_ERROR(fitter.differentiate(&found));
+  // What a step showed beside the slopes of before it is bend as much as slope.
+  const bool exact = sides == infer::Sides::kOne || found.fresh;
+  if (found.slopes.size() == 0 || !exact) RETURN_IF_ERROR(fitter.differentiate(&found));
   fit.at = space.values(found.u);
   RETURN_IF_ERROR(predict());
   take(study, fitter, found, &fit);

@@ -39,7 +39,7 @@ enum class BaseParameters { kHeld, kFitted };
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<EffectCandidate>& effects, const Overrides& start,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds,
-                             Loss loss = Loss::kHuber);
+                             Loss loss = Loss::kHuber, infer::Sides sides = infer::Sides::kOne);
 
 // As such: no columns.
 Eigen::MatrixXd no_nuisances(const Study& study);

@@ -129,6 +129,11 @@ class Profile {
 Result<JointFit> profiled(Predictor& predictor, const Study& study,
                           const std::vector<EffectCandidate>& effects, JointFit fit) {
   if (fit.parameters.size() == fit.base_parameters) return fit;
+  const auto fit_from = [&](const Overrides& at) {
+    return fit_jointly(predictor, study, effects, at, BaseParameters::kFitted, no_nuisances(study),
+                       kLongSearch, Loss::kRedescending, infer::Sides::kBoth);
+  };
+  ASSIGN_OR_RETURN(fit, fit_from(fit.at));
   const infer::Forward forward = [&](const std::vector<PredictionRequest>& points) {
     return predictor.attempt(points);
   };
@@ -137,7 +142,8 @@ Result<JointFit> profiled(Predictor& predictor, const Study& study,
   const infer::Fitter fitter(forward, observations, space);
   infer::Fit middle = as_searched(study, fit, fitter, space);
   std::vector<double> bent;
-  for (int moved = 0;; ++moved) {
+  int moved = 0;
+  for (;; ++moved) {
     Profile profile(fitter, space, middle, static_cast<Eigen::Index>(fit.base_parameters));
     RETURN_IF_ERROR(profile.look());
     bent = profile.bent();
@@ -145,9 +151,9 @@ Result<JointFit> profiled(Predictor& predictor, const Study& study,
     if (lower == nullptr || moved == kMostMoves) break;
     middle = infer::Fit(*lower);
   }
-  ASSIGN_OR_RETURN(
-      fit, fit_jointly(predictor, study, effects, space.values(middle.u), BaseParameters::kFitted,
-                       no_nuisances(study), kLongSearch, Loss::kRedescending));
+  if (moved > 0) {
+    ASSIGN_OR_RETURN(fit, fit_from(space.values(middle.u)));
+  }
   for (std::size_t k = 0; k < bent.size(); ++k) {
     fit.parameters[k].bent = bent[k];
     fit.parameters[k].standard_error *= bent[k];

@@ -101,7 +101,7 @@ Result<JointFit> estimate_beside(const DiagnosisRequest& of, const Explanation& 
                                  const NestedFit& with_base) {
   return fit_jointly(of.predictor, named.study(), named.chosen, with_base.fit.at,
                      BaseParameters::kHeld, named.evidence->nuisances, kLongSearch,
-                     Loss::kRedescending);
+                     Loss::kRedescending, infer::Sides::kBoth);
 }
 
 // Where more is left than a name allows, what the catalogue does explain is named as no cause; the

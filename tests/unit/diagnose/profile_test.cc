@@ -130,7 +130,7 @@ TEST(Profile, WidensNothingOfAQuotient) {
   const FittedParameter &found = looked->parameters[1], &beside = looked->parameters[0];
   EXPECT_NEAR(found.value / beside.value, 0.5, 1e-3);
   EXPECT_NEAR(found.standard_error / found.value, std::hypot(0.3, kNoise_m / 0.5), 0.01);
-  EXPECT_NEAR(found.bent, 1, 0.05);  // slopes are over finite steps
+  EXPECT_NEAR(found.bent, 1, 1e-3);
 }
 
 // Two standard errors of the slopes to either side a saturating end has moved by tanh(2).
