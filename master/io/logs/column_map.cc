@@ -105,6 +105,10 @@ void write_table(const char* name, const TableMap& table, std::string& out) {
         c.role.find_first_not_of(
             "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == c.role.npos;
     const std::string role = table.intervals && c.role == "t" ? "dt" : c.role;
+    if (c.scale == 0) {
+      out += role + " = " + format_double(c.offset) + "\n";
+      continue;
+    }
     out += (plain ? role : quoted(role)) + " = { column = " + quoted(c.column) +
            (c.unit.empty() ? "" : ", unit = " + quoted(c.unit));
     for (const ColumnNumber& number : kNumbers) {
@@ -163,18 +167,15 @@ class MapReader {
       if (c.role != "dt" || map.find("t") != nullptr) continue;
       map.intervals = true;
       c.role = "t";
+      // Of another column nothing, and the same in every row.
+      const bool constant = c.column.empty() && c.scale == 0;
+      if (constant)
+        c.column = map.columns[&c == &map.columns.front() ? map.columns.size() - 1 : 0].column;
     }
     if (map.find("t") == nullptr) {
       refuse(
           " has no t, expected the column of the times (or dt, of the seconds since the row "
-          "before)");
-    }
-    const bool counts =
-        std::ranges::any_of(map.columns, [](const MappedColumn& c) { return c.rate; });
-    if (map.intervals && counts) {
-      refuse(
-          " has dt and a column with rate = true, expected increment = true with what the count "
-          "changed by, or t");
+          "before; dt = 0.2 where every row lasts so long)");
     }
     if (map.increments && !map.keep.empty()) {
       refuse(
@@ -207,6 +208,10 @@ class MapReader {
     if (const auto* word = node.as_string()) {
       section.find(role);
       column.column = word->get();
+    } else if (node.is_number() && role == "dt") {
+      column.unit = "s";
+      column.scale = 0;
+      section.read(role, column.offset, 1e-6, 1e6, "s");
     } else if (auto inner = section.section(role)) {
       inner->read("column", column.column);
       inner->read("unit", column.unit);
@@ -235,7 +240,7 @@ class MapReader {
         }
       }
     }
-    if (column.column.empty()) {
+    if (column.column.empty() && column.scale != 0) {
       errors_.add(node, role + " names no column, expected " + role +
                             " = { column = \"...\", unit = \"...\" }");
     }
@@ -342,7 +347,7 @@ bool at_its_time(const TableMap& map, bool poses, std::vector<double>& before,
   const double last = before.empty() ? 0 : before[0];
   if (map.intervals) values[0] += last;  // the end of its stretch
   if (!map.intervals && !rates && !increments) return true;
-  const bool begins = before.empty() && !map.intervals;
+  const bool begins = before.empty() && (rates || !map.intervals);
   const double dt = values[0] - last;
   if (!begins && !(dt >= 0 && (dt > 0 || poses))) return false;
   std::vector<double> row = rates ? before : values;

@@ -66,6 +66,19 @@ std::span<const std::string> known_units();
 // The best guess by names, types and ranges.  Kinds that were not found have no columns.
 LogMap guess_map(const std::vector<Recording>& recordings);
 
+// How columns of two sides are read: their MappedColumn's `rate` and `increment`, beside poses with
+// TableMap::increments, and the share of the motions that they leave so (NaN: too few rows, or not
+// of one table).
+struct WheelReading {
+  bool increments = false, rate = false, increment = false;
+  double left = 0;
+};
+
+// As mapped, or as wheels explain a table's motions clearly better.
+WheelReading best_reading(const LogTable& table, const TableMap& poses, const TableMap& wheels);
+// Errors: the map has another.
+Status check_reading(const LogTable& table, const LogMap& map);
+
 // TOML of [poses], [commands], [wheels] and [gyro], for `--map`.
 std::string format_map(const LogMap& map);
 // Errors with file, line and column: unknown units, kinds without t, poses without x, y and a

@@ -1,6 +1,5 @@
 // Columns guessed by their names, their types and the numbers in them.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <regex>
 
@@ -8,6 +7,7 @@
 #include "common/math/statistics.h"
 #include "common/recordings/run.h"
 #include "master/io/logs/column_map.h"
+#include "master/io/logs/column_names.h"
 #include "master/io/logs/topics.h"
 
 namespace gapfarm {
@@ -21,40 +21,14 @@ constexpr double kNearClocks_s = 60;
 // 1 ms and 5 s apart.
 constexpr double kFewestMs = 5, kFewestUs = 1e3, kFewestNs = 1e6;
 
-// "Vicon x [mm]" to "vicon.x"; paths and blanks become dots, units in brackets go.
-std::string plain(const std::string& name) {
-  std::string out;
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    const char c = name[i];
-    if (c == '[' || c == '(') break;
-    const bool word = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '%';
-    if (word) {
-      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    } else if (!out.empty() && out.back() != '.') {
-      out += '.';
-    }
-  }
-  while (!out.empty() && out.back() == '.') out.pop_back();
-  if (out.rfind("field.", 0) == 0) out.erase(0, 6);
-  return out;
-}
-
-// "*." in front: any path before; the first alias that a column has wins.
-bool fits(const std::string& column, const std::string& alias) {
-  if (alias.rfind("*.", 0) != 0) return column == alias;
-  return column == alias.substr(2) || column.ends_with(alias.substr(1));
-}
-
-using Aliases = std::vector<std::string>;
-
 struct Role {
   const char* name;
   Aliases aliases;
 };
 
 const Aliases kTime = {
-    "t",    "time",   "*.header.stamp",       "timestamp", "stamp", "%time", "__time", "time_s",
-    "secs", "*.time", "elapsed.time.sensors", "dt"};
+    "t",    "time",   "*.header.stamp",       "timestamp", "stamp",   "%time", "__time", "time_s",
+    "secs", "*.time", "elapsed.time.sensors", "dt",        "delta_t", "period"};
 const Aliases kRun = {"run", "step", "trial", "take"};
 const Aliases kKeep = {"pose_new"};
 
@@ -106,18 +80,6 @@ double greatest(const std::vector<double>& values) {
   return most;
 }
 
-bool has_word(const std::string& name, const std::string& word) {
-  return std::regex_search(name, std::regex("(^|[^A-Za-z0-9])" + word + "([^A-Za-z0-9]|$)"));
-}
-
-// The unit in "v [km/h]" or "v (km/h)", where it is known.
-std::string unit_in_name(const std::string& name) {
-  const std::size_t from = name.find_first_of("[("), end = name.find_first_of("])");
-  if (from == name.npos || end == name.npos || end < from) return "";
-  const std::string unit = name.substr(from + 1, end - from - 1);
-  return !unit.empty() && unit_factor(unit) != 0 ? unit : "";
-}
-
 class Guess {
  public:
   explicit Guess(const std::vector<Recording>& recordings) : recordings_(recordings) {}
@@ -135,15 +97,6 @@ class Guess {
   }
 
  private:
-  static std::string column_of(const LogTable& table, const Aliases& aliases) {
-    for (const std::string& alias : aliases) {
-      for (const std::string& column : table.columns) {
-        if (fits(plain(column), alias)) return column;
-      }
-    }
-    return {};
-  }
-
   // The stamp of the message where it is set and on the recorder's clock, else the recorder's time.
   static std::string time_of(const LogTable& table) {
     const std::string stamp = column_of(table, {"*.header.stamp"});
@@ -159,7 +112,7 @@ class Guess {
 
   void consider(const Recording& recording, const LogTable& table) {
     const std::string time = time_of(table);
-    if (time.empty()) return;
+    if (time.empty() && sides_of(table).empty()) return;
     // A better pose than odometry replaces it: odometry cannot show slip.
     const bool odometry = is_odometry(table);
     const bool wanted = map_.poses.columns.empty() || (!odometry_.empty() && !odometry);
@@ -167,6 +120,7 @@ class Guess {
     const bool measured = table.type.find("Odometry") != std::string::npos;
     if (map_.commands.columns.empty() && !measured) guess_commands(table, time);
     if (map_.wheels.columns.empty()) guess_wheels(table, time);
+    if (map_.wheels.columns.empty() && map_.commands.columns.empty()) guess_sides(table, time);
     const std::string rate = column_of(table, {"angular_velocity.z", "yaw_rate", "gyro_z"});
     if (!map_.gyro.columns.empty() || rate.empty()) return;
     start(table, time, map_.gyro);
@@ -177,6 +131,11 @@ class Guess {
     to = {};
     to.source = table.topic;
     to.run = column_of(table, kRun);
+    if (time.empty()) {
+      to.intervals = true;
+      to.columns.push_back({"t", table.columns.front(), "s", /*scale=*/0, /*offset=*/1});
+      return;
+    }
     to.columns.push_back({"t", time, time_unit(table, time)});
     const std::string& unit = to.columns.back().unit;
     to.intervals =
@@ -191,9 +150,10 @@ class Guess {
       if (!column.empty()) found.columns.push_back({role.name, column, ""});
     }
     const auto there = [&](const char* role) { return found.find(role) != nullptr; };
+    if (!there("x") && !there("y") && !there("theta")) guess_motions(table, found);
     const bool quaternion = there("qx") && there("qy") && there("qz") && there("qw");
     const bool place = there("x") && there("y");
-    found.increments = place && plain(found.find("x")->column) == "dx";
+    found.increments |= place && plain_name(found.find("x")->column) == "dx";
     if (found.increments) guess_noise(table, found);
     const bool heading = quaternion || there("theta");
     if (place && !heading && map_.no_heading.empty()) map_.no_heading = table.source;
@@ -215,13 +175,36 @@ class Guess {
     map_.poses = std::move(found);
   }
 
+  // "sx", "sy", "stheta": what a matcher of scans calls increments.
+  static void guess_motions(const LogTable& table, TableMap& found) {
+    for (const std::string& column : table.columns) {
+      std::string prefix = plain_name(column);
+      if (prefix.size() < 2 || prefix.back() != 'x') continue;
+      prefix.pop_back();
+      const std::string y = column_of(table, {prefix + "y"});
+      const std::string theta =
+          column_of(table, {prefix + "theta", prefix + "th", prefix + "yaw", prefix + "heading"});
+      if (y.empty() || theta.empty()) continue;
+      for (const auto& [role, of] : {std::pair{"x", column}, {"y", y}, {"theta", theta}}) {
+        found.columns.push_back({role, of, ""});
+      }
+      found.increments = true;
+      return;
+    }
+  }
+
   static void guess_noise(const LogTable& table, TableMap& increments) {
     for (const auto* roles : {&kCovarianceColumns, &kDeviationColumns}) {
       if (!increments.noise().empty()) return;
-      const auto there = [&](const std::string& role) { return !column_of(table, {role}).empty(); };
-      if (!std::ranges::all_of(*roles, there)) continue;
+      const auto of = [&](const std::string& role) {
+        const std::string rest = role.substr(role.find('_'));
+        return column_of(table, roles == &kDeviationColumns
+                                    ? Aliases{role, "sigma" + rest, "std" + rest}
+                                    : Aliases{role});
+      };
+      if (std::ranges::any_of(*roles, [&](const auto& role) { return of(role).empty(); })) continue;
       for (const std::string& role : *roles) {
-        increments.columns.push_back({role, column_of(table, {role}), ""});
+        increments.columns.push_back({role, of(role), unit_in_name(of(role))});
       }
     }
   }
@@ -279,6 +262,39 @@ class Guess {
     if (found.columns.size() > 1) map_.wheels = std::move(found);
   }
 
+  // Wheels by a name that nobody knows: what they hold is what explains the motions beside them.
+  void guess_sides(const LogTable& table, const std::string& time) {
+    const std::vector<std::string> sides = sides_of(table);
+    if (sides.empty() || !has_all(table, map_.poses)) return;
+    start(table, time, map_.wheels);
+    const bool speed =
+        std::regex_search(plain_name(sides[0]), std::regex("omega|vel|speed|rpm|^w"));
+    for (std::size_t k = 0; k < 2; ++k) {
+      MappedColumn c{k == 0 ? "left" : "right", sides[k], unit_in_name(sides[k])};
+      c.increment = !speed;
+      map_.wheels.columns.push_back(std::move(c));
+    }
+    const WheelReading as = best_reading(table, map_.poses, map_.wheels);
+    for (std::size_t k = 1; k < 3; ++k) {
+      map_.wheels.columns[k].rate = as.rate;
+      map_.wheels.columns[k].increment = as.increment;
+    }
+    map_.poses.increments = as.increments;
+    if (as.increments && map_.poses.noise().empty()) guess_noise(table, map_.poses);
+    map_.notes.push_back(
+        "wheels by the names of columns: " + sides[0] + " and " + sides[1] + " are taken as " +
+        (as.rate        ? "counts"
+         : as.increment ? "what each turned by in a row"
+                        : "speeds") +
+        " in " + (map_.wheels.columns[1].unit.empty() ? "rad" : map_.wheels.columns[1].unit) +
+        "; of ticks write scale = (2 pi over those of a turn) into the map");
+    if (time.empty()) {
+      map_.notes.push_back(
+          "no column of times: each row is taken to last 1 s, which changes no "
+          "speed of wheels that were measured a row");
+    }
+  }
+
   // Whether the file has a row of units: what it states is not guessed.
   static bool stated(const LogTable& table, const std::string& column) {
     return !table.unit_of(column).empty();
@@ -318,7 +334,7 @@ class Guess {
     for (const char* unit : {"mm", "cm"}) {
       if (has_word(x, unit)) return unit;
     }
-    if (found.increments) return "m";
+    if (found.increments || found.find("t")->scale == 0) return "m";
     const auto xi = table.find(x), ti = table.find(found.find("t")->column);
     // The median outlives jumps between runs and stamps that hardly differ.
     std::vector<double> speeds;
@@ -338,6 +354,7 @@ class Guess {
   // Headings in radians stay within a turn or grow smoothly past it; 60 rad are ten turns.
   std::string angle_unit(const LogTable& table, const std::string& column) {
     if (stated(table, column)) return "";
+    if (has_word(column, "mrad")) return "mrad";
     if (has_word(column, "deg") || column.find("_deg") != column.npos) return "deg";
     const std::vector<double> values = numbers(table, column);
     double jump = 0;
@@ -360,7 +377,7 @@ class Guess {
   static std::string rim_unit(const LogTable& table, const std::string& column) {
     if (stated(table, column)) return "";
     if (column.find("rpm") != column.npos) return "rpm";
-    const std::string name = plain(column);
+    const std::string name = plain_name(column);
     const bool speed = name == "vl" || name == "vr" || name == "v_left" || name == "v_right" ||
                        name.find("speed") != name.npos;
     if (speed) return "m/s";

@@ -87,6 +87,9 @@ class Importer {
     const TableMap& map = map_.*kind.map;
     if (map.columns.empty()) return {};
     for (const LogTable& table : recordings_[recording].tables) {
+      if (&map == &map_.commands && has_all(table, map) && has_all(table, map_.poses)) {
+        RETURN_IF_ERROR(check_reading(table, map_));
+      }
       if (!map.source.empty() && table.topic != map.source && !table.source.ends_with(map.source)) {
         continue;
       }
@@ -349,6 +352,12 @@ class Importer {
         if (n > 0)
           out_.report.push_back("omitted: " + std::to_string(n) + " rows of " + kind.name + why);
       }
+    }
+    const MappedColumn* left = map_.commands.find("left");
+    if (left != nullptr && map_.commands.intervals && !left->rate && !left->increment) {
+      out_.report.push_back(
+          "left and right are taken as speeds; of what they turned by in a row "
+          "write increment = true into the map");
     }
     for (const Recording& recording : recordings_) {
       for (const LogTable& table : recording.tables) {

@@ -163,7 +163,6 @@ TEST(Tables, IncrementsAreChainedFromWhereEachStretchBegins) {
   ASSERT_FALSE(broken);
   EXPECT_THAT(broken.error().message, HasSubstr("row 2"));
   EXPECT_FALSE(parse_map("[poses]\ndt = \"dt\"\nkeep = \"k\"\n" + poses, "m.toml"));
-  EXPECT_FALSE(parse_map("[wheels]\ndt = \"dt\"\nl = { column = \"l\", rate = true }\n", "m.toml"));
 }
 
 TEST(Tables, CountersThatBeginAnewCountOn) {
