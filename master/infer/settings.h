@@ -291,6 +291,9 @@ inline constexpr std::size_t kLeastRunsHeldOut = 4;
 // stretches | round | Of increments, which know of nothing that lasts: tens of stretches say
 // better than ten how far values scatter.
 inline constexpr std::size_t kLeastRelativeBlocks = 30;
+// stretches | derived: n of n - 3 scatter as Student's t of n - 1 degrees does | Of a single run so
+// many fewer are drawn than it has for the intervals of values.
+inline constexpr std::size_t kSparedStretches = 3;
 // share | round | That what turns add to commands differs by from run to run.
 inline constexpr double kAddedByTurnsSd = 0.1;
 // - | round | A matcher that states its deviations is too sure by so much at most.

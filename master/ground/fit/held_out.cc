@@ -44,7 +44,8 @@ std::vector<char> out_with(int fold, const std::vector<int>& folds) {
 // Of what depends on how often each block counts.
 template <class Of>
 HeldOutGain drawn_gain(const WindowSet& windows, std::uint64_t seed, const Of& of) {
-  const auto [lo, hi] = ninety_percent_of(mapped(draw_blocks(windows, seed, 0), of));
+  const auto [lo, hi] =
+      ninety_percent_of(mapped(draw_blocks(windows, seed, /*of_values=*/false), of));
   return {of(std::vector<double>(windows.blocks, 1.0)), lo, hi};
 }
 
@@ -119,9 +120,16 @@ WindowFit judge_held_out(const WindowFitter& fitter, WindowFit fit,
 }
 
 std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint64_t seed,
-                                             std::size_t spared) {
+                                             bool of_values) {
   Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
-  const auto runs = blocks_of_runs(windows);
+  auto runs = blocks_of_runs(windows);
+  std::size_t spared = of_values ? 1 : 0;
+  if (of_values && runs.size() == 1) {
+    const auto [first, count] = runs.front();
+    runs.clear();
+    for (int k = 0; k < count; ++k) runs.emplace_back(first + k, 1);
+    spared = kSparedStretches;
+  }
   const std::size_t drawn = std::max<std::size_t>(1, runs.size() - std::min(spared, runs.size()));
   const double weight = static_cast<double>(runs.size()) / static_cast<double>(drawn);
   std::vector<std::vector<double>> all(kDraws, std::vector<double>(windows.blocks, 0.0));

@@ -30,11 +30,11 @@ WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& ro
 WindowFit judge_held_out(const WindowFitter& fitter, WindowFit fit,
                          const std::vector<Eigen::Vector3d>& raw);
 
-// How often each block of a log counts, draw by draw.  Of n runs n less `spared` are drawn (of
-// values one is spared, so that the scatter of few is not taken for small), and of each as many
-// blocks as it has; together they count as n.
+// How often each block of a log counts, draw by draw.  Of n runs n are drawn, and of each as many
+// blocks as it has; together they count as n.  `of_values`: so that the scatter of few is not taken
+// for small, one run fewer is drawn, or of a single run kSparedStretches blocks fewer.
 std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint64_t seed,
-                                             std::size_t spared);
+                                             bool of_values);
 
 // What nine in ten of some draws lie within.
 Interval ninety_percent_of(std::vector<double> drawn);

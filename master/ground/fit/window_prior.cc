@@ -129,7 +129,8 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed, bo
   const std::vector<Equations> blocks = equations_of_blocks(fit);
   const Eigen::MatrixXd P = prior_precision(fit.rows);
   const Eigen::VectorXd away = fit.values - nominals(fit.rows);
-  const std::vector<std::vector<double>> all_times = draw_blocks(windows_, seed, 1);
+  const std::vector<std::vector<double>> all_times =
+      draw_blocks(windows_, seed, /*of_values=*/true);
   Eigen::MatrixXd drawn(n, kDraws);
   Stream stream({seed, Purpose::kStatistics, 4, 0, 0});
   for (int d = 0; d < kDraws; ++d) {

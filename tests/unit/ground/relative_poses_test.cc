@@ -9,6 +9,7 @@
 #include "common/base/ranges.h"
 #include "common/recordings/run.h"
 #include "master/ground/diagnose_ground.h"
+#include "master/ground/fit/held_out.h"
 #include "master/io/logs/column_map.h"
 #include "tests/unit/ground/scan_matched.h"
 
@@ -167,6 +168,57 @@ TEST(RelativePoses, StraightAheadNothingIsTheWrongWayRound) {
                                         {{kEachRow_s}, 0}, 1, nullptr, /*alone=*/true);
     EXPECT_TRUE(asked) << seed << ": " << asked.error().message;
   }
+}
+
+// Small turns explain short rows whose places are mostly noise, which was refused.
+TEST(RelativePoses, ShortNoisyRowsAreExplainedByTheirTurns) {
+  Stream stream({3, Purpose::kTest, 0, 0, 0});
+  std::vector<WheelSpeeds> rows;
+  for (int k = 0; k < 300; ++k) {
+    const double left = 1 + 2 * stream.uniform();
+    rows.push_back({left, left + stream.uniform() - 0.5});
+  }
+  const OfRows noisy{{{0.015, 0.015, 0.002}}};
+  const auto asked =
+      ask_what_changed(robot_by_its_maker(), log_of({scanned("1", rows, kSensor, noisy, stream)}),
+                       {{kEachRow_s}, 0}, 1, nullptr, /*alone=*/true);
+  EXPECT_TRUE(asked) << asked.error().message;
+}
+
+// What wheels turned by in a row, or another count, read as speeds: radii came out as many times
+// too large as priors let them.
+TEST(RelativePoses, WheelsThatAreNoSpeedsAreRefusedWithTheRemedy) {
+  for (const double speed : {kDt_s, 3.0}) {
+    RunLog log = driven(2, 31);
+    for (LoggedRun& run : log.runs) {
+      for (CommandRow& row : run.commands) {
+        for (double& value : row.values) value *= speed;
+      }
+    }
+    const auto asked = ask_what_changed(robot_by_its_maker(), log, {{kEachRow_s}, 0}, 1, nullptr);
+    ASSERT_FALSE(asked) << asked->reference->values.transpose();
+    EXPECT_NE(asked.error().message.find("increment = true"), std::string::npos)
+        << asked.error().message;
+  }
+}
+
+// Of a single run stretches are drawn, three fewer than it has: as Student's t has it.
+TEST(RelativePoses, IntervalsOfASingleRunAllowForTheFewnessOfItsStretches) {
+  const auto windows = window_set(robot_by_its_maker(), driven(1, 31), {{kEachRow_s}, 0});
+  ASSERT_TRUE(windows);
+  const auto n = static_cast<double>(windows->blocks);
+  double squares = 0;
+  const auto draws = draw_blocks(*windows, 1, /*of_values=*/true);
+  for (const std::vector<double>& times : draws) {
+    double sum = 0;
+    for (const double count : times) {
+      sum += count;
+      squares += (count - 1) * (count - 1);
+    }
+    EXPECT_NEAR(sum, n, 1e-9);
+  }
+  const double variance = squares / (n * static_cast<double>(draws.size()));
+  EXPECT_NEAR(variance, (n - 1) / (n - 3), 0.02);
 }
 
 // It once looked for what the log shows without end.
