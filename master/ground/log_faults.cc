@@ -240,15 +240,16 @@ double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {
       for (int c = 0; c < 3; ++c) moved[c].push_back(c == 0 ? X.x : c == 1 ? X.y : X.theta);
     }
     const auto count = static_cast<double>(moved[0].size());
-    // Straight drives at one speed differ by noise alone.
+    // Straight drives at one speed differ by noise alone, which no command explains.
     const double way = sizes.head<2>().norm(), turns = std::max(sizes[2], count);
     // A throttle's windows begin at the speed that was measured, which says how far they go.
     for (int c = is_throttled(fitter.robot()) ? 1 : 0; c < 3 && count > 0; ++c) {
       const double middle = median(moved[c]);
       double scatter = 0;
       for (const double m : moved[c]) scatter += std::abs(m - middle);
-      if (scatter > kEvenMotion * (c < 2 ? way : turns)) {
-        least = std::min(least, missing[c] / scatter);
+      const double share = missing[c] / std::max(scatter, 1e-12);
+      if (share < kUnexplained || scatter > kEvenMotion * (c < 2 ? way : turns)) {
+        least = std::min(least, share);
       }
     }
   }

@@ -1,5 +1,7 @@
 #include "master/ground/reference.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -163,6 +165,16 @@ WindowFit open_fit(const WindowFitter& fitter, const GroundRobot& robot,
   return log.relative ? with_delay(fitter, fit) : fit;
 }
 
+// A size that is half or twice the file's, or more; -1: none is.
+Eigen::Index another_robots(const WindowFit& fit) {
+  const auto far = [&](const FitRow& row) {
+    const double ratio = fit.values[&row - fit.rows.data()];
+    return row.row.key == "ratio" && (ratio < 1 / kMostRatio || ratio > kMostRatio);
+  };
+  const auto found = std::ranges::find_if(fit.rows, far);
+  return found == fit.rows.end() ? -1 : found - fit.rows.begin();
+}
+
 // Whether values account for where windows end: what is left is small beside the motion, and no
 // wheel has half or twice its size or turns the other way.
 bool explains(const WindowFitter& fitter, const WindowFit& fit) {
@@ -171,11 +183,7 @@ bool explains(const WindowFitter& fitter, const WindowFit& fit) {
     ways.push_back(std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y));
     turns.push_back(std::abs(wrap_angle(t.X_WE.theta - t.X_WS.theta)));
   }
-  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
-    if (fit.rows[k].row.key != "ratio") continue;
-    const double ratio = fit.values[k];
-    if (ratio < 1 / kMostRatio || ratio > kMostRatio) return false;
-  }
+  if (another_robots(fit) >= 0) return false;
   const Eigen::Vector3d& left = fit.scales.front();
   return left.head<2>().maxCoeff() < kExplained * median(ways) &&
          left[2] < kExplained * median(turns);
@@ -306,6 +314,15 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   }
   if (const double left = share_unexplained(fitter, fit); left >= kUnexplained) {
     return Error{unexplained_text(left)};
+  }
+  if (const Eigen::Index far = another_robots(fit); reference.relative && far >= 0) {
+    const KinematicRow& row = fit.rows[far].row;
+    return Error{fmt::format(
+        "By this log {} is {:.2g} times what the robot's file says, or more off than that. Do "
+        "columns of wheels hold speeds? Of what they turned by in a row the import's map says "
+        "increment = true, of counts rate = true, of ticks and degrees a scale or a unit. Of true "
+        "speeds correct the robot's file",
+        row.name, fit.values[far])};
   }
   std::vector<GroundHypothesis> traits = that_can_show(reference, ground_hypotheses(robot));
   if (alone) {

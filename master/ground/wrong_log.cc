@@ -220,7 +220,8 @@ Faults wrong_units_of_commands(const GroundRobot& robot) {
     });
     all.push_back(fault("unit_error", {"command_units", unit.alias},
                         std::string("the unit of the ") + unit.thing + ": " + unit.name,
-                        "Multiply them by " + std::to_string(factor) + ".",
+                        "Multiply them by " + std::to_string(factor) +
+                            (robot.measured ? "; ticks by 2 pi over those of a turn." : "."),
                         scale_commands(of_it, factor, unit.beyond)));
   }
   return all;
