@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <memory>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -42,13 +40,16 @@ double squares_of(const Eigen::VectorXd& z, Eigen::Index i) {
   return z.segment<3>(3 * i).squaredNorm();
 }
 
-// An observation that jumps, across the rim of a patch, say, moves no farther than one that is far
-// beyond the others.
-void bound_jumps(double far, Eigen::VectorXd* change) {
+// Root mean square of a change of `seen` observations.  One that jumps, across the rim of a patch,
+// say, moves no farther than one that is far beyond the others.
+double bound_jumps(std::size_t seen, double scale, Eigen::VectorXd* change) {
+  const double moved = std::sqrt(change->squaredNorm() / (3 * static_cast<double>(seen)));
+  const double far = kFarDeviations * std::max(moved, scale);
   for (Eigen::Index i = 0; i < change->size(); i += 3) {
-    const double moved = change->segment<3>(i).norm();
-    if (moved > far) change->segment<3>(i) *= far / moved;
+    const double by = change->segment<3>(i).norm();
+    if (by > far) change->segment<3>(i) *= far / by;
   }
+  return moved;
 }
 
 }  // namespace
@@ -195,9 +196,7 @@ Status Fitter::move_each(const Forward& forward, const Eigen::VectorXd& from, do
     const Eigen::Index k = dimension[j];
     const double step = share * fit->differences[k];
     Eigen::VectorXd change = whitened(*ends[j]) - from;
-    const double moved =
-        std::sqrt(change.squaredNorm() / (3 * static_cast<double>(ends[j]->size())));
-    bound_jumps(kFarDeviations * std::max(moved, fit->scale), &change);
+    const double moved = bound_jumps(ends[j]->size(), fit->scale, &change);
     fit->slopes.col(k) = change / step;
     const double good = kGoodMove * fit->scale / std::max(moved / std::abs(step), 1e-9);
     fit->differences[k] = std::clamp(good, kLeastDifference, kMostDifference);
@@ -210,27 +209,27 @@ Status Fitter::move_each(const Forward& forward, const Eigen::VectorXd& from, do
 // The same of those that can be moved both ways, by kShareOfSides of their differences.
 Status Fitter::move_both_ways(const Forward& forward, std::vector<Eigen::Index>* open,
                               Fit* fit) const {
+  const Eigen::VectorXd by = kShareOfSides * fit->differences;
+  const auto has_room = [&](Eigen::Index k) {
+    return fit->u[k] - by[k] >= space_.lower()[k] && fit->u[k] + by[k] <= space_.upper()[k];
+  };
   std::vector<PredictionRequest> requests;
   for (const Eigen::Index k : *open) {
-    for (const double side : {-kShareOfSides, kShareOfSides}) {
-      Eigen::VectorXd u = fit->u;
-      u[k] = std::clamp(u[k] + side * fit->differences[k], space_.lower()[k], space_.upper()[k]);
-      requests.push_back({space_.values(u), observations_.asked});
+    if (!has_room(k)) continue;
+    for (const double side : {-1.0, 1.0}) {
+      const Eigen::VectorXd there = fit->u + side * by[k] * Eigen::VectorXd::Unit(by.size(), k);
+      requests.push_back({space_.values(there), observations_.asked});
     }
   }
   ASSIGN_OR_RETURN(const auto ends, forward(requests));
   std::size_t next = 0;
   std::erase_if(*open, [&](Eigen::Index k) {
-    const auto& below = ends[next++];
-    const auto& above = ends[next++];
-    const double whole = 2 * kShareOfSides * fit->differences[k];
-    const bool inside =
-        fit->u[k] - whole / 2 >= space_.lower()[k] && fit->u[k] + whole / 2 <= space_.upper()[k];
-    if (!inside || !below || !above) return false;
+    if (!has_room(k)) return false;
+    const auto &below = ends[next++], &above = ends[next++];
+    if (!below || !above) return false;
     Eigen::VectorXd change = whitened(*above) - whitened(*below);
-    const double moved = std::sqrt(change.squaredNorm() / static_cast<double>(change.size()));
-    bound_jumps(kFarDeviations * std::max(moved, 2 * kShareOfSides * fit->scale), &change);
-    fit->slopes.col(k) = change / whole;
+    bound_jumps(above->size(), 2 * kShareOfSides * fit->scale, &change);
+    fit->slopes.col(k) = change / (2 * by[k]);
     return true;
   });
   return {};
@@ -376,30 +375,6 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
     }
   }
   return scores;
-}
-
-Forward remembering(Forward forward, std::size_t most) {
-  using Point = std::pair<Overrides, std::vector<std::uint32_t>>;
-  using Ends = std::optional<std::vector<Pose>>;
-  return [forward = std::move(forward), most, known = std::make_shared<std::map<Point, Ends>>()](
-             const std::vector<PredictionRequest>& points) -> Result<std::vector<Ends>> {
-    if (known->size() > most) known->clear();
-    std::vector<PredictionRequest> unknown;
-    for (const PredictionRequest& p : points) {
-      if (known->try_emplace({p.at, p.trials}).second) unknown.push_back(p);
-    }
-    if (!unknown.empty()) {
-      auto ends = forward(unknown);
-      if (!ends) {
-        known->clear();
-        return ends.error();
-      }
-      for (std::size_t k = 0; k < unknown.size(); ++k) {
-        (*known)[{unknown[k].at, unknown[k].trials}] = std::move((*ends)[k]);
-      }
-    }
-    return mapped(points, [&](const PredictionRequest& p) { return known->at({p.at, p.trials}); });
-  };
 }
 
 }  // namespace gapfarm::infer

@@ -43,15 +43,6 @@ struct Observations {
   std::size_t size() const { return measured.size(); }
 };
 
-// Predicted poses of the observations asked for, at each point; none where a point cannot be
-// simulated.  Errors: the simulation's own, never a point's.
-using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>>>>(
-    const std::vector<PredictionRequest>& points)>;
-
-// The same, asking once for what was asked before, of some `most` points and the last batch: a fit
-// of what no simulation moves stays where it is.
-Forward remembering(Forward forward, std::size_t most = SIZE_MAX);
-
 struct Fit {
   Eigen::VectorXd u;            // in the space's coordinates
   Eigen::VectorXd z;            // whitened residuals

@@ -1,9 +1,12 @@
 #include "master/infer/predictor.h"
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
 #include <set>
+#include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/score/motion_model.h"
 
@@ -232,4 +235,31 @@ Result<std::vector<std::vector<PathSample>>> Predictor::paths(
   return paths;
 }
 
+namespace infer {
+
+Forward remembering(Forward forward, std::size_t most) {
+  using Point = std::pair<Overrides, std::vector<std::uint32_t>>;
+  using Ends = std::optional<std::vector<Pose>>;
+  return [forward = std::move(forward), most, known = std::make_shared<std::map<Point, Ends>>()](
+             const std::vector<PredictionRequest>& points) -> Result<std::vector<Ends>> {
+    if (known->size() > most) known->clear();
+    std::vector<PredictionRequest> unknown;
+    for (const PredictionRequest& p : points) {
+      if (known->try_emplace({p.at, p.trials}).second) unknown.push_back(p);
+    }
+    if (!unknown.empty()) {
+      auto ends = forward(unknown);
+      if (!ends) {
+        known->clear();
+        return ends.error();
+      }
+      for (std::size_t k = 0; k < unknown.size(); ++k) {
+        (*known)[{unknown[k].at, unknown[k].trials}] = std::move((*ends)[k]);
+      }
+    }
+    return mapped(points, [&](const PredictionRequest& p) { return known->at({p.at, p.trials}); });
+  };
+}
+
+}  // namespace infer
 }  // namespace gapfarm

@@ -2,6 +2,7 @@
 // simulation. All points of a call are one batch of farm work.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -80,4 +81,16 @@ class Predictor {
   std::map<std::string, std::string> excluded_;
 };
 
+namespace infer {
+
+// Predicted poses of the observations asked for, at each point; none where a point cannot be
+// simulated.  Errors: the simulation's own, never a point's.
+using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>>>>(
+    const std::vector<PredictionRequest>& points)>;
+
+// The same, asking once for what was asked before, of some `most` points and the last batch: a fit
+// of what no simulation moves stays where it is.
+Forward remembering(Forward forward, std::size_t most = SIZE_MAX);
+
+}  // namespace infer
 }  // namespace gapfarm
