@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/base/hash.h"
-#include "common/problem/abilities.h"
 #include "common/score/motion_model.h"
 #include "worker/fitness.h"
 #include "worker/scenarios/scenario.h"

@@ -79,6 +79,13 @@ class [[nodiscard]] Result<void> {
 
 using Status = Result<void>;
 
+// `result`; an error's sentence begins with "`where`: ".
+template <class T>
+Result<T> under(const std::string& where, Result<T> result) {
+  if (result) return result;
+  return Error{where + ": " + result.error().message, result.error().code};
+}
+
 }  // namespace gapfarm
 
 // What passes errors on, in one line each.

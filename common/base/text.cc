@@ -4,7 +4,6 @@
 #include <cctype>
 #include <ctime>
 #include <numeric>
-#include <utility>
 
 namespace gapfarm {
 namespace {

@@ -6,10 +6,10 @@
 
 #include "common/base/build_info.h"
 #include "common/base/clock.h"
+#include "common/base/ranges.h"
 #include "common/config/sections.h"
 #include "common/config/toml_section.h"
 #include "common/external/simulator.h"
-#include "common/problem/abilities.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"

@@ -241,7 +241,7 @@ void read_genes(TomlSection& top, const ParameterTable& table, std::vector<Gene>
   if (!section) return;
   GeneReader(table, section->errors(), genes).read_table(section->table());
   // The order in the file must not matter: the genome's order is part of every result.
-  std::sort(genes.begin(), genes.end(), [](const Gene& a, const Gene& b) { return a.row < b.row; });
+  std::ranges::sort(genes, {}, &Gene::row);
 }
 
 }  // namespace gapfarm

@@ -150,8 +150,7 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
     model.values = model.table().nominal();  // effects that the file omits are neutral
   }
   if (form.program) {
-    if (Status s = read_model_program(top, model); !s)
-      return Error{path + ": " + s.error().message};
+    RETURN_IF_ERROR(under(path, read_model_program(top, model)));
   }
   read_base(top, "parameters", model);
   read_base(top, "noise", model);

@@ -1,5 +1,6 @@
 // Writing models.
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/config/model.h"
 #include "common/config/sections.h"
@@ -170,7 +171,7 @@ Status check_model(const Model& model) {
 }
 
 Status write_model(const Model& model, const std::string& path) {
-  if (Status s = check_model(model); !s.ok()) return Error{path + ": " + s.error().message};
+  RETURN_IF_ERROR(under(path, check_model(model)));
   return write_file_atomically(path, format_model(model));
 }
 

@@ -1,5 +1,4 @@
 // [commands], [fitness] and [spread]: the rest of the problem.
-#include <algorithm>
 #include <filesystem>
 #include <set>
 

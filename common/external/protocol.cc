@@ -25,13 +25,12 @@ double number_of(const Json& json, const char* key, double fallback) {
 
 Result<unsigned> read_inputs(const Json& json) {
   unsigned inputs = 0;
-  std::vector<std::string> known;
-  for (const ExternalInputWord& word : kExternalInputNames) known.emplace_back(word.word);
   for (const Json& word : json.value("inputs", Json::array())) {
     const std::string text = word.is_string() ? word.get<std::string>() : json_text(word);
-    const auto row = std::find_if(std::begin(kExternalInputNames), std::end(kExternalInputNames),
-                                  [&](const ExternalInputWord& r) { return text == r.word; });
-    if (row == std::end(kExternalInputNames)) {
+    const auto* row = find_by(kExternalInputNames, text, &ExternalInputWord::word);
+    if (!row) {
+      const std::vector<std::string> known(
+          mapped(kExternalInputNames, [](auto& r) { return std::string(r.word); }));
       return Error{"declares the unknown input '" + text + "'" + suggestion(text, known)};
     }
     inputs |= row->input;

@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/external/line_json.h"
 #include "common/process/child.h"
@@ -36,11 +37,8 @@ LineProgram::~LineProgram() { kill(); }
 std::string LineProgram::name() const { return joined(argv_, " "); }
 
 std::string LineProgram::by_hand(const std::vector<std::string>& lines) const {
-  std::string text = "cd " + shell_quoted(folder_.empty() ? "." : folder_) + " && printf '%s\\n'";
-  for (const std::string& line : lines) text += " " + shell_quoted(line);
-  text += " |";
-  for (const std::string& word : argv_) text += " " + shell_quoted(word);
-  return text;
+  return "cd " + shell_quoted(folder_.empty() ? "." : folder_) + " && printf '%s\\n' " +
+         joined(lines, " ", shell_quoted) + " | " + joined(argv_, " ", shell_quoted);
 }
 
 void LineProgram::kill() {

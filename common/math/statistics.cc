@@ -40,9 +40,7 @@ double mean(std::span<const double> values) {
 double median(std::span<const double> values) { return quantile(values, 0.5); }
 
 double median_deviation(std::span<const double> values, double centre) {
-  std::vector<double> sizes;
-  for (const double v : values) sizes.push_back(std::abs(v - centre));
-  return 1.4826 * median(sizes);
+  return 1.4826 * median(mapped(values, [&](double v) { return std::abs(v - centre); }));
 }
 
 double circular_mean(std::span<const double> angles_rad) {

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "common/base/constants.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/parameters/external.h"
@@ -137,10 +136,9 @@ void ParameterTable::without_chance(ParameterValues* values) const {
 }
 
 bool ParameterTable::is_neutral(std::size_t e, const ParameterValues& values) const {
-  for (std::size_t i = 0; i < effects_[e].strengths; ++i) {
-    if (values[effect_rows_[e] + i] != effects_[e].parameters[i].nominal) return false;
-  }
-  return true;
+  return std::ranges::all_of(indices(effects_[e].strengths), [&](std::size_t i) {
+    return values[effect_rows_[e] + i] == effects_[e].parameters[i].nominal;
+  });
 }
 
 Status ParameterTable::check(std::size_t row, double value) const {

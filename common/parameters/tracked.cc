@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "common/base/constants.h"
 #include "common/base/text.h"
 #include "common/parameters/rows.h"
 #include "common/parameters/srv1_robot_file.h"

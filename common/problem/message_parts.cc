@@ -42,13 +42,10 @@ Status read_external(const v1::Problem& message, Problem* problem) {
   if (!(command.answer_limit_s > 0 && command.answer_limit_s <= 1e6)) {
     return Error{"problem: an external program's answer limit must be in (0, 1000000] s"};
   }
-  auto program = make_external_program(std::move(command), from.introduction(), objective);
-  if (!program) return Error{"problem: " + program.error().message};
-  if (Status s = check_program(**program, *problem); !s) {
-    return Error{"problem: " + s.error().message};
-  }
-  problem->external = std::move(*program);
-  return {};
+  ASSIGN_OR_RETURN(
+      problem->external,
+      under("problem", make_external_program(std::move(command), from.introduction(), objective)));
+  return under("problem", check_program(*problem->external, *problem));
 }
 
 namespace {
@@ -179,7 +176,7 @@ Status read_outliers(const v1::Problem& message, Problem* problem) {
   for (const auto& [key, value] : outlier_values(outliers)) {
     *value = from.GetReflection()->GetDouble(from, from.GetDescriptor()->FindFieldByName(key));
   }
-  if (Status s = check_outliers(outliers); !s) return Error{"problem: " + s.error().message};
+  RETURN_IF_ERROR(under("problem", check_outliers(outliers)));
   problem->residual.outliers = outliers;
   return {};
 }
@@ -209,8 +206,8 @@ Status read_residual(const v1::Problem& message, Problem* problem) {
     problem->residual.field.push_back(std::move(term));
   }
   RETURN_IF_ERROR(read_outliers(message, problem));
-  const Status sound = check_residual(problem->residual.field, command_names(problem->commands));
-  return sound ? Status() : Error{"problem: " + sound.error().message};
+  return under("problem",
+               check_residual(problem->residual.field, command_names(problem->commands)));
 }
 
 }  // namespace gapfarm

@@ -1,7 +1,9 @@
 #include "common/problem/problem.h"
 
+#include <algorithm>
 #include <cassert>
 #include <filesystem>
+#include <iterator>
 
 #include "common/base/hash.h"
 #include "common/base/ranges.h"
@@ -77,9 +79,7 @@ Status Simulated::set_robot(const std::string& text, const std::string& path) {
     ground = std::make_shared<const GroundTable>(robot);
     values = table().nominal();
   } else {
-    auto table = make_tracked_table(robot);
-    if (!table) return Error{path + ": " + table.error().message};
-    tracked = *std::move(table);
+    ASSIGN_OR_RETURN(tracked, under(path, make_tracked_table(robot)));
     values = tracked->values();
   }
   robot_file = text;
@@ -90,6 +90,10 @@ ParameterValues Problem::values_of(const Genome& genome) const {
   ParameterValues all = values;
   if (!genome.empty()) decode(table(), genes, genome, all);
   return all;
+}
+
+Genome Problem::genome_of(const ParameterValues& of) const {
+  return mapped(genes, [&](const Gene& gene) { return encode_gene(table(), gene, of[gene.row]); });
 }
 
 std::span<const std::string> Problem::channels() const {
@@ -240,6 +244,39 @@ std::string point_settings(const Problem& problem, const v1::Task& task) {
     if (override.parameter() < values.size()) add(override.parameter(), override.value());
   }
   return text;
+}
+
+namespace {
+
+// All others predict, simulate and trace.
+struct Limited {
+  std::string_view scenario;
+  unsigned can;
+  const char* why;
+};
+
+constexpr const char* kFollowsRuns =
+    "it follows logged commands: there are no commands of its own to plan or trace; use gapfarm "
+    "horizons";
+constexpr Limited kLimited[] = {
+    {"ground", kPredicts, kFollowsRuns},
+    {"external_runs", kPredicts, kFollowsRuns},
+    {"objective", kEvaluates,
+     "scenario objective has values and a number, and no trials or motions, which this command is "
+     "about; it can be checked, evolved, resumed, compared and replayed, and shown by status, "
+     "serve "
+     "and report"},
+    {"racquetball", kTraces,
+     "scenario racquetball has paths and no trials: nothing can be predicted or logged; use "
+     "gapfarm influence"},
+};
+
+}  // namespace
+
+Status check_can(std::string_view scenario, unsigned what, const std::string& file) {
+  const auto row = std::ranges::find(kLimited, scenario, &Limited::scenario);
+  if (row == std::end(kLimited) || (row->can & what) != 0) return {};
+  return Error{(file.empty() ? "" : file + ": ") + row->why};
 }
 
 }  // namespace gapfarm

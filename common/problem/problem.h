@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -126,6 +127,8 @@ struct Problem : Simulated {
   const TrackedTable& treads() const { return tracked ? *tracked : srv1_robot(); }
   // The problem's values with the genes of `genome` put in; an empty genome changes nothing.
   ParameterValues values_of(const Genome& genome) const;
+  // Each gene where `values`, one a row, have it.
+  Genome genome_of(const ParameterValues& values) const;
   // Of the commands of its runs.  REQUIRES: the scenario's form has windows.
   std::span<const std::string> channels() const;
   bool windows() const;
@@ -208,5 +211,11 @@ std::string task_label(const v1::Task& task);
 // What the task's genome and overrides make of the problem's values, as options of `simulate`:
 // "--set friction=0.41 --set mass=0.3"; "" where it changes none.
 std::string point_settings(const Problem& problem, const v1::Task& task);
+
+enum ScenarioCan : unsigned { kPredicts = 1, kSimulates = 2, kTraces = 4, kEvaluates = 8 };
+
+// Error: the scenario can nothing of `what`; why, and what can be done instead.  It begins with
+// `file`, of which the scenario is; empty: none.
+Status check_can(std::string_view scenario, unsigned what, const std::string& file = {});
 
 }  // namespace gapfarm

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "common/base/hash.h"
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/problem/message_parts.h"
 #include "common/problem/problem.h"
@@ -77,7 +78,7 @@ Status read_pieces(const v1::Problem& message, Problem* problem) {
   for (const v1::Piece& p : message.pieces()) {
     Piece piece = from_proto(p);
     if (p.x_size() != p.y_size()) return invalid("piece '" + p.name() + "' has half a corner");
-    if (Status s = check_piece(piece); !s) return invalid(s.error().message);
+    RETURN_IF_ERROR(under("problem", check_piece(piece)));
     problem->pieces.push_back(std::move(piece));
   }
   if (!wanted) return {};
@@ -114,8 +115,7 @@ Status read_robot(const v1::Problem& message, Problem* problem) {
   if (message.robot().empty() && form.robot) return invalid("scenario 'ground' needs a robot");
   if (message.robot().empty()) return {};
   if (!form.robot && !form.other_robot) return invalid(problem->scenario + " has no robot");
-  if (Status s = problem->set_robot(message.robot(), "robot"); !s)
-    return invalid(s.error().message);
+  RETURN_IF_ERROR(under("problem", problem->set_robot(message.robot(), "robot")));
   problem->values.clear();
   return {};
 }
@@ -179,7 +179,7 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
   for (const v1::Trial& t : message.trials()) {
     Trial trial = from_proto(t);
     const std::string where = "trial " + trial.session + "/" + std::to_string(trial.trial);
-    if (std::find(names.begin(), names.end(), trial.command) == names.end()) {
+    if (!contains(names, trial.command)) {
       return invalid(where + ": unknown command '" + trial.command + "'" +
                      suggestion(trial.command, names));
     }
@@ -296,11 +296,9 @@ v1::Override override_of(std::size_t row, double value) {
 
 std::vector<v1::Override> overrides_of(const ParameterValues& problem,
                                        const ParameterValues& values) {
-  std::vector<v1::Override> overrides;
-  for (std::size_t row = 0; row < values.size(); ++row) {
-    if (values[row] != problem[row]) overrides.push_back(override_of(row, values[row]));
-  }
-  return overrides;
+  return filtered(
+      indices(values.size()), [&](std::size_t row) { return values[row] != problem[row]; },
+      [&](std::size_t row) { return override_of(row, values[row]); });
 }
 
 v1::Problem to_proto(const Problem& problem) {

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "common/base/clock.h"
+#include "common/base/ranges.h"
 #include "common/process/child.h"
 
 namespace gapfarm {
@@ -226,19 +227,11 @@ bool ProcessPool::exhausted() const {
 }
 
 std::vector<pid_t> ProcessPool::pids() const {
-  std::vector<pid_t> pids;
-  for (const Place& place : places_) {
-    if (place.pid != 0) pids.push_back(place.pid);
-  }
-  return pids;
+  return filtered(mapped(places_, &Place::pid), [](pid_t pid) { return pid != 0; });
 }
 
 std::vector<int> ProcessPool::fds() const {
-  std::vector<int> fds;
-  for (const Place& place : places_) {
-    if (place.pidfd >= 0) fds.push_back(place.pidfd);
-  }
-  return fds;
+  return filtered(mapped(places_, &Place::pidfd), [](int fd) { return fd >= 0; });
 }
 
 void ProcessPool::signal_all(int signal) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/robot/robot.h"
 
@@ -205,8 +206,7 @@ class Completion {
     if (!places_wheels()) {
       const auto radius = r_.controller.robot_radius_m;
       if (!radius) return missing("robot_radius in m, or the wheels' x, y and heading");
-      std::vector<std::string> names;
-      for (const RobotWheel& w : r_.wheels) names.push_back(w.name);
+      std::vector<std::string> names = mapped(r_.wheels, &RobotWheel::name);
       if (names.empty() && r_.command == CommandKind::kTwist) {
         names = {"wheel_1", "wheel_2", "wheel_3"};
         assume("three wheels");
@@ -228,10 +228,9 @@ class Completion {
   }
 
   Status mecanum() {
-    const bool placed = places_wheels();
     const auto& k = r_.controller;
-    double lx = 0, ly = 0;
-    if (!placed) {
+    if (!places_wheels()) {
+      double lx = 0, ly = 0;
       if (k.wheelbase_m && k.wheel_separation_m) {
         lx = *k.wheelbase_m / 2;
         ly = *k.wheel_separation_m / 2;
@@ -241,8 +240,6 @@ class Completion {
       } else {
         return missing("wheelbase and wheel_separation, or sum_of_robot_center_projection, in m");
       }
-    }
-    if (!placed) {
       pair("front_", lx, ly);
       pair("rear_", -lx, ly);
     }

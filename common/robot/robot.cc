@@ -122,11 +122,9 @@ double turning_multiplier(const GroundRobot& robot) {
 }
 
 double wheel_reach_m(const GroundRobot& robot) {
-  double farthest = 0;
-  for (const RobotWheel& w : robot.wheels) {
-    farthest = std::max(farthest, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
-  }
-  return farthest;
+  return max_of(robot.wheels, [](const RobotWheel& w) {
+    return std::hypot(w.x_m.value_or(0), w.y_m.value_or(0));
+  });
 }
 
 std::optional<std::size_t> channel_of(const RobotWheel& wheel,

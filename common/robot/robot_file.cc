@@ -191,7 +191,7 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
   read_wheels(top, robot.wheels);
   top.finish();
   if (!errors.empty()) return errors.error();
-  if (Status s = complete_robot(&robot); !s) return Error{path + ": " + s.error().message};
+  RETURN_IF_ERROR(under(path, complete_robot(&robot)));
   return robot;
 }
 

@@ -51,16 +51,14 @@ Eigen::Matrix3d predictive_covariance(const Pose& X_SE, const Eigen::Matrix3d& d
 }
 
 Result<double> robust_distance(const Pose& X_SE, const RealMotion& real) {
-  const Result<Covariance3> covariance = Covariance3::factorise(real.covariance);
-  if (!covariance) {
-    return Error{"real motion of '" + real.command + "': " + covariance.error().message};
-  }
+  ASSIGN_OR_RETURN(const auto covariance, under("real motion of '" + real.command + "'",
+                                                Covariance3::factorise(real.covariance)));
   const Eigen::Vector3d difference(X_SE.x - real.mean.x, X_SE.y - real.mean.y,
                                    wrap_angle(X_SE.theta - real.mean.theta));
   if (!difference.allFinite()) {
     return Error{"simulated motion of '" + real.command + "': the end pose is not finite"};
   }
-  return std::sqrt(covariance->squared_distance(difference));
+  return std::sqrt(covariance.squared_distance(difference));
 }
 
 void MotionFacts::include(const MotionFacts& others) {

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <optional>
 
 #include "common/score/kinematic_body.h"
 

@@ -90,12 +90,12 @@ Result<double> MotionModel::log_density(const Pose& X_WS, const CommandSpec& com
                                         const Pose& X_WE, double outlier_share) const {
   ASSIGN_OR_RETURN(const auto* found, find(command));
   const RobustPose& motion = found->motion;
-  const Result<Covariance3> covariance = Covariance3::factorise(motion.covariance);
-  if (!covariance) return Error{describe(command) + ": " + covariance.error().message};
+  ASSIGN_OR_RETURN(const auto covariance,
+                   under(describe(command), Covariance3::factorise(motion.covariance)));
   const Pose end = between(X_WS, X_WE);
   const Eigen::Vector3d residual(end.x - motion.mean.x, end.y - motion.mean.y,
                                  wrap_angle(end.theta - motion.mean.theta));
-  return log_predictive_density(residual, *covariance, outlier_share);
+  return log_predictive_density(residual, covariance, outlier_share);
 }
 
 std::vector<LoggedMotion> logged_motions(const Problem& problem) {

@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <system_error>
@@ -87,6 +86,12 @@ Status put_in_place(const std::string& temporary, const std::string& path, IfThe
 bool is_there(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);
+}
+
+std::string whole_path(const std::string& path) {
+  std::error_code code;
+  const auto whole = std::filesystem::absolute(path, code);
+  return code ? path : whole.string();
 }
 
 bool is_folder(const std::filesystem::path& path) {

@@ -24,6 +24,9 @@ auto parse_file(const std::string& path, const Parse& parse) -> decltype(parse(p
 bool is_there(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 
+// From the root on; as it stands where nothing says where that is.
+std::string whole_path(const std::string& path);
+
 // `path` as a command that was called in `folder` meant it: below that where it is relative and
 // there is such a file, as it stands otherwise, or where that is the same.
 std::string path_from(const std::string& folder, const std::string& path);

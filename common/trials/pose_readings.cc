@@ -139,11 +139,7 @@ void for_stretches(std::span<const Pose> track, double grid_m, Each each) {
 }
 
 PoseGrid position_grid(std::span<const Pose> poses) {
-  std::vector<double> x, y;
-  for (const Pose& X : poses) {
-    x.push_back(X.x);
-    y.push_back(X.y);
-  }
+  const std::vector<double> x = mapped(poses, &Pose::x), y = mapped(poses, &Pose::y);
   PoseGrid grid;
   double span = 0;
   for (const std::vector<double>* axis : {&x, &y}) {
@@ -165,8 +161,7 @@ PoseGrid position_grid(std::span<const Pose> poses) {
 }
 
 double heading_step(std::span<const Pose> poses) {
-  std::vector<double> headings;
-  for (const Pose& X : poses) headings.push_back(X.theta);
+  const std::vector<double> headings = mapped(poses, &Pose::theta);
   const std::vector<double> values = distinct(headings);
   return values.size() < kLeastDistinct ? 0 : grid_of(headings, values);
 }

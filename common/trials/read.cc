@@ -57,14 +57,10 @@ struct ReadableLog {
   bool paths;  // whether a paths.csv may
 };
 
-TrialLog parse_trial_rows(std::string_view text, const std::string& file,
-                          std::span<const std::string> commands, Mistakes& mistakes) {
-  return parse_log(kTrialLogForm, text, file, commands, mistakes);
-}
-
-TrialLog parse_push_rows(std::string_view text, const std::string& file,
-                         std::span<const std::string> commands, Mistakes& mistakes) {
-  return parse_log(kPushLogForm, text, file, commands, mistakes);
+template <const LogForm& form>
+TrialLog parse_rows(std::string_view text, const std::string& file,
+                    std::span<const std::string> commands, Mistakes& mistakes) {
+  return parse_log(form, text, file, commands, mistakes);
 }
 
 TrialLog parse_run(std::string_view text, const std::string& file,
@@ -78,8 +74,8 @@ TrialLog parse_run(std::string_view text, const std::string& file,
 const ReadableLog& readable_log(TextFormat format) {
   // The first is what another format is reported as.
   static const ReadableLog kLogs[] = {
-      {TextFormat::kTrialLog, parse_trial_rows, false, true},
-      {TextFormat::kPushLog, parse_push_rows, true, true},
+      {TextFormat::kTrialLog, parse_rows<kTrialLogForm>, false, true},
+      {TextFormat::kPushLog, parse_rows<kPushLogForm>, true, true},
       {TextFormat::kBbautotune, parse_run, false, false},
   };
   for (const ReadableLog& log : kLogs) {
@@ -220,7 +216,7 @@ Result<TrialLog> finished(TrialLog log, const Mistakes& mistakes) {
 Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
                               std::span<const std::string> commands, const ReadOptions& options) {
   Mistakes mistakes(options.skip_invalid);
-  return finished(parse_trial_rows(text, file, commands, mistakes), mistakes);
+  return finished(parse_log(kTrialLogForm, text, file, commands, mistakes), mistakes);
 }
 
 Result<TrialLog> read_trial_files(std::span<const std::string> paths,

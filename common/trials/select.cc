@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/trial.h"
@@ -24,10 +25,10 @@ Result<TrialColumnReader> trial_column_reader(const TrialLog& log, const std::st
     return TrialColumnReader([](const Trial& t) { return t.command; });
   }
   const auto& extra = log.extra_columns;
-  const auto found = std::find(extra.begin(), extra.end(), column);
+  const auto found = std::ranges::find(extra, column);
   if (found == extra.end()) {
     std::vector<std::string> known = {"session", "trial", "command", "object"};
-    known.insert(known.end(), extra.begin(), extra.end());
+    append(known, extra);
     return Error{"the log has no column '" + column + "'" + suggestion(column, known)};
   }
   const auto i = static_cast<std::size_t>(found - extra.begin());
@@ -40,11 +41,10 @@ Result<TrialLog> select_trials(const TrialLog& log, std::span<const std::string>
   for (const std::string& filter : filters) {
     const auto [column, list] = cut_at(filter, '=');
     if (column.empty() || !list) return Error{filter + ": expected COLUMN=VALUE[,VALUE...]"};
-    const auto reader = trial_column_reader(log, column);
-    if (!reader) return Error{filter + ": " + reader.error().message};
+    ASSIGN_OR_RETURN(const auto reader, under(filter, trial_column_reader(log, column)));
     const auto values = parts_of(*list, ',');
     std::erase_if(chosen.trials, [&](const Trial& trial) {
-      const std::string word = (*reader)(trial);
+      const std::string word = reader(trial);
       return std::none_of(values.begin(), values.end(),
                           [&](std::string_view value) { return same(word, value); });
     });

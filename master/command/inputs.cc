@@ -10,11 +10,9 @@
 
 #include "common/base/build_info.h"
 #include "common/base/text.h"
-#include "common/problem/abilities.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
 #include "master/ground/diagnose_ground.h"
-#include "master/io/log_checks/log_checks.h"
 #include "master/store/run_reader.h"
 #include "master/store/schema.h"
 

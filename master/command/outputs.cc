@@ -11,9 +11,9 @@
 #include <fstream>
 #include <string_view>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/config/config.h"
-#include "common/problem/abilities.h"
 #include "common/trials/files.h"
 #include "master/store/records.h"
 
@@ -140,9 +140,8 @@ void Outputs::reads_runs(const std::vector<std::string>& folders) {
 
 Status Outputs::check(const std::string& path, bool replace) const {
   if (is_in_place(path)) return {};
-  const auto input = std::ranges::find_if(
-      inputs_, [&](const std::string& other) { return same_file(path, other); });
-  if (input != inputs_.end()) {
+  const auto is_this = [&](const std::string& other) { return same_file(path, other); };
+  if (std::ranges::any_of(inputs_, is_this)) {
     return Error{path + ": is read by this command, so it cannot be written; give another name"};
   }
   if (is_folder(path)) {
@@ -198,7 +197,7 @@ Status Outputs::write(const std::string& path, std::string_view bytes) const {
 }
 
 Status Outputs::write_model(const std::string& path, const Model& model) const {
-  if (Status s = check_model(model); !s) return Error{path + ": " + s.error().message};
+  RETURN_IF_ERROR(under(path, check_model(model)));
   return write(path, format_model(model));
 }
 
@@ -255,8 +254,7 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
                  " traces commands and no trials; omit --trials and --only"};
   }
   ASSIGN_OR_RETURN(config, read_config_and_trials(path, trials));
-  ASSIGN_OR_RETURN(TrialLog log, select_trials(config.problem.log, only));
-  config.problem.log = std::move(log);
+  ASSIGN_OR_RETURN(config.problem.log, select_trials(config.problem.log, only));
   const std::vector<Trial>& pushes = config.problem.log.trials;
   for (std::uint32_t i = 0; i < pushes.size(); ++i) {
     const auto wanted = [&](const CommandSpec& c) { return c.name == pushes[i].command; };
@@ -270,8 +268,8 @@ Status TracedCommands::choose(const std::vector<CommandSpec>& known, TraceSettin
   to->commands = known;
   if (!names.empty()) to->commands.clear();
   for (const std::string& name : names) {
-    const auto found = std::ranges::find(known, name, &CommandSpec::name);
-    if (found == known.end()) {
+    const CommandSpec* found = find_by(known, name, &CommandSpec::name);
+    if (!found) {
       return Error{"there is no command '" + name + "'" + suggestion(name, command_names(known))};
     }
     to->commands.push_back(*found);

@@ -9,7 +9,6 @@
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
 #include "common/config/config.h"
-#include "common/problem/abilities.h"
 #include "common/process/process_pool.h"
 #include "common/trials/read.h"
 #include "master/cli/subcommand.h"

@@ -6,7 +6,6 @@
 
 #include "common/base/text.h"
 #include "common/json/fields.h"
-#include "common/problem/abilities.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/trial.h"
 #include "common/trials/write.h"

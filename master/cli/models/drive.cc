@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/problem/abilities.h"
 #include "common/trials/read.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
@@ -45,10 +45,8 @@ struct Task {
 
 Result<std::vector<double>> numbers(const std::string& text, std::size_t count,
                                     const std::string& what) {
-  std::vector<double> found;
-  for (const std::string_view part : parts_of(text, ',')) {
-    found.push_back(parse_double(part).value_or(NAN));
-  }
+  const auto found = mapped(parts_of(text, ','),
+                            [](std::string_view part) { return parse_double(part).value_or(NAN); });
   if (found.size() != count ||
       !std::ranges::all_of(found, [](double v) { return std::isfinite(v); })) {
     return Error{what + " is '" + text + "', expected " + std::to_string(count) +
@@ -60,26 +58,24 @@ Result<std::vector<double>> numbers(const std::string& text, std::size_t count,
 // "forward" or "turn_ccw:0.5".
 Result<CommandSpec> command_of(const std::string& text, const std::vector<CommandSpec>& known) {
   const auto [name, duration] = cut_at(text, ':');
-  for (const CommandSpec& spec : known) {
-    if (spec.name != name) continue;
-    CommandSpec command = spec;
-    if (duration) {
-      ASSIGN_OR_RETURN(const auto seconds, numbers(*duration, 1, "the duration of " + name));
-      if (!(seconds[0] > 0 && seconds[0] <= kLongestCommand_s)) {
-        return Error{
-            fmt::format("command '{}' lasts outside (0, {:g}] s", text, kLongestCommand_s)};
-      }
-      command.duration_s = seconds[0];
-    }
-    return command;
+  const CommandSpec* spec = find_by(known, name, &CommandSpec::name);
+  if (!spec) {
+    return Error{"there is no command '" + name + "'" + suggestion(name, command_names(known))};
   }
-  return Error{"there is no command '" + name + "'" + suggestion(name, command_names(known))};
+  if (!duration) return *spec;
+  ASSIGN_OR_RETURN(const auto seconds, numbers(*duration, 1, "the duration of " + name));
+  if (!(seconds[0] > 0 && seconds[0] <= kLongestCommand_s)) {
+    return Error{fmt::format("command '{}' lasts outside (0, {:g}] s", text, kLongestCommand_s)};
+  }
+  CommandSpec command = *spec;
+  command.duration_s = seconds[0];
+  return command;
 }
 
 Result<Task> read_task(const DriveCommand& command, const Model& model) {
-  const int kinds = (command.commands.empty() ? 0 : 1) + (command.waypoints.empty() ? 0 : 1) +
-                    (command.log.empty() ? 0 : 1);
-  if (kinds != 1) return Error{"give one of --commands, --waypoints and --log"};
+  if (command.commands.empty() + command.waypoints.empty() + command.log.empty() != 2) {
+    return Error{"give one of --commands, --waypoints and --log"};
+  }
   Task task;
   ASSIGN_OR_RETURN(const auto start, numbers(command.start, 3, "--start"));
   if (std::abs(start[2]) > 2 * std::numbers::pi) {

@@ -4,7 +4,6 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/problem/abilities.h"
 #include "common/trials/read.h"
 #include "common/trials/trial.h"
 #include "common/trials/write.h"
@@ -111,8 +110,7 @@ Result<int> run_simulate(SimulateOptions& options, CliContext& context) {
   RETURN_IF_ERROR(apply_options(options, source.config));
   ASSIGN_OR_RETURN(const Plan plan, plan_and_outputs(options, source, context));
   if (context.dry_run) {
-    std::size_t trials = 0;
-    for (const auto& session : plan) trials += session.size();
+    const auto trials = sum_of(plan, [](const auto& session) { return session.size(); });
     return print_dry_run("simulate " + std::to_string(trials) + " trials in " +
                              std::to_string(plan.size()) + " sessions into " + options.out +
                              ", seed " + std::to_string(source.config.seed),
