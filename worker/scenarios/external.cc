@@ -1,14 +1,71 @@
+// A user's program behind a scenario (docs/external.md, docs/objective.md).
+#include <poll.h>
+
 #include <cmath>
 #include <exception>
 #include <string>
 
-#include "worker/scenarios/program.h"
+#include "common/base/clock.h"
+#include "common/external/simulator.h"
+#include "common/random/stream.h"
 #include "worker/scenarios/scenario.h"
 #include "worker/scenarios/srv1/srv1_robot.h"
 #include "worker/scenarios/windows.h"
 
 namespace gapfarm {
 namespace {
+
+// Problems of one program share the process: it is started once, and costs what it costs.  One a
+// thread, because its answers are in the order of what it is asked.
+std::shared_ptr<ExternalSimulator> shared_simulator(const ExternalCommand& command) {
+  struct Started {
+    ExternalCommand command;
+    std::weak_ptr<ExternalSimulator> simulator;
+  };
+  static thread_local std::vector<Started> all;
+  std::erase_if(all, [](const Started& one) { return one.simulator.expired(); });
+  for (const Started& one : all) {
+    if (one.command == command) return one.simulator.lock();
+  }
+  auto simulator = std::make_shared<ExternalSimulator>(command, monotonic_seconds);
+  all.push_back({command, simulator});
+  return simulator;
+}
+
+// WORKER_UNFIT where this worker may not start what a master names.
+std::optional<v1::TaskResult> refuse_to_start() {
+  if (external_programs_allowed()) return std::nullopt;
+  return failed_task(
+      v1::WORKER_UNFIT,
+      "this worker starts no programs that a master names; start it with --allow-external, and "
+      "only for a master that you trust with its machine");
+}
+
+// What an answer that is not there says: of this worker, or of the task.
+v1::Outcome outcome_of(const Error& error) {
+  return error.code == ErrorCode::kNoProgram ? v1::WORKER_UNFIT : v1::WORKER_FAILED;
+}
+
+// A machine may lack memory or processes for a moment: a program is started as often as a task may
+// end workers (JobLimits), with the waits of ProcessPoolOptions.
+constexpr int kMostStarts = 3;
+constexpr int kStartAgain_ms = 100;
+
+// ExternalSimulator::simulate().  `steps` advance while the program computes, since it has a limit
+// of its own.
+template <class Request>
+auto ask_program(ExternalSimulator& simulator, Request& request, const ExternalProgram& program,
+                 StepCounter* steps) {
+  simulator.while_waiting([steps] { count_step(steps); });
+  auto answer = simulator.simulate(request, program.introduction);
+  for (int starts = 1; starts < kMostStarts; ++starts) {
+    if (answer || answer.error().code != ErrorCode::kNoProgram) break;
+    poll(nullptr, 0, starts * kStartAgain_ms);
+    answer = simulator.simulate(request, program.introduction);
+  }
+  count_step(steps);
+  return answer;
+}
 
 class ExternalFailure : public std::exception {
  public:
@@ -144,17 +201,13 @@ class ExternalModel final : public ScenarioModel {
 
   Prediction predict(const ParameterValues& values, const PredictOptions& options) const override {
     Prediction prediction;
-    if (const auto refusal = refuse_to_start()) {
-      prediction.outcome = refusal->outcome();
-      prediction.message = refusal->message();
-      return prediction;
-    }
-    try {
-      return model_->predict(values, options);
-    } catch (const ExternalFailure& failure) {
-      prediction.outcome = failure.outcome();
-      prediction.message = failure.what();
-    }
+    const v1::TaskResult failed = guarded([&] {
+      prediction = model_->predict(values, options);
+      return v1::TaskResult();
+    });
+    if (failed.outcome() == v1::OUTCOME_UNSPECIFIED) return prediction;
+    prediction.outcome = failed.outcome();
+    prediction.message = failed.message();
     return prediction;
   }
 
@@ -183,6 +236,52 @@ class ExternalModel final : public ScenarioModel {
   std::unique_ptr<ScenarioModel> model_;
 };
 
+// Without noise one seed a run: what a program draws is the same whatever its values, so that no
+// set of values is better by luck.
+std::uint32_t seed_of(const v1::StreamKey& key, bool noisy) {
+  StreamKey drawn{key.run_seed(), Purpose::kEvaluation, 0, 0, 0};
+  if (noisy) drawn = {key.run_seed(), Purpose::kEvaluation, 0, key.birth_id(), key.replicate()};
+  return static_cast<std::uint32_t>(Stream(drawn).bits());
+}
+
+class ObjectiveModel final : public ScenarioModel {
+ public:
+  explicit ObjectiveModel(const Problem& problem)
+      : problem_(problem), program_(shared_simulator(problem.external->command)) {}
+
+  v1::TaskResult evaluate(const ParameterValues& values, const v1::EvaluateTask& task,
+                          StepCounter* steps) const override {
+    if (auto refusal = refuse_to_start()) return *refusal;
+    ExternalRequest request;
+    request.declaration = &problem_.external->table.declaration();
+    request.values = values;
+    for (const SearchedObjective& objective : problem_.fitness.objectives) {
+      request.objectives.push_back(objective.name);
+    }
+    request.seed = seed_of(task.stream(), problem_.spread.kind == SpreadKind::kSampled);
+    const auto answer = ask_program(*program_, request, *problem_.external, steps);
+    v1::TaskResult result;
+    result.set_message(answer ? answer->message : answer.error().message);
+    if (!answer) {
+      result.set_outcome(outcome_of(answer.error()));
+    } else if (answer->diverged) {
+      result.set_outcome(v1::DIVERGED);
+    } else {
+      result.set_outcome(answer->violation > 0 ? v1::INFEASIBLE : v1::OK);
+      result.mutable_evaluate()->set_fitness(answer->value);
+      result.mutable_evaluate()->set_penalty(answer->violation);
+      result.mutable_evaluate()->mutable_objectives()->Add(answer->values.begin(),
+                                                           answer->values.end());
+      result.mutable_evaluate()->set_conditions(1);
+    }
+    return result;
+  }
+
+ private:
+  const Problem& problem_;
+  std::shared_ptr<ExternalSimulator> program_;
+};
+
 }  // namespace
 
 std::unique_ptr<ScenarioModel> prepare_external(const Problem& problem) {
@@ -192,6 +291,10 @@ std::unique_ptr<ScenarioModel> prepare_external(const Problem& problem) {
 std::unique_ptr<Vehicle> make_external_vehicle(const Problem& problem,
                                                const ParameterValues& values, StepCounter* steps) {
   return std::make_unique<ExternalVehicle>(problem, values, steps);
+}
+
+std::unique_ptr<ScenarioModel> prepare_objective(const Problem& problem) {
+  return std::make_unique<ObjectiveModel>(problem);
 }
 
 }  // namespace gapfarm

@@ -60,8 +60,7 @@ TrialPrediction WindowModel::observe(const ParameterValues& values, const Pose& 
                                      bool means_only) const {
   const auto& samples = motion.samples;
   const auto index = [&](double t) {
-    const auto found = std::lower_bound(samples.begin(), samples.end(), t,
-                                        [](const GroundSample& s, double x) { return s.t_s < x; });
+    const auto found = std::ranges::lower_bound(samples, t, {}, &GroundSample::t_s);
     return static_cast<std::size_t>(found - samples.begin());
   };
   const std::size_t from = index(*trial.t_s);

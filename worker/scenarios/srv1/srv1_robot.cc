@@ -294,8 +294,7 @@ Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, co
 
 Pose pose_before_end(const std::vector<MotionSample>& path, double age_s) {
   const double when = path.back().t_s - age_s;
-  const auto after = std::upper_bound(path.begin(), path.end(), when,
-                                      [](double t, const MotionSample& s) { return t < s.t_s; });
+  const auto after = std::ranges::upper_bound(path, when, {}, &MotionSample::t_s);
   if (after == path.begin()) return path.front().X_SB;
   if (after == path.end()) return path.back().X_SB;
   const MotionSample& a = *(after - 1);

@@ -9,7 +9,7 @@
 #include "worker/sim/observe.h"
 #include "worker/sim/patches.h"
 #include "worker/sim/push/face_step.h"
-#include "worker/sim/push/stepped_push.h"
+#include "worker/sim/push/push_engine.h"
 
 namespace gapfarm {
 namespace {
