@@ -4,7 +4,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -17,7 +16,6 @@
 #include "common/json/json.h"
 #include "common/process/child.h"
 #include "common/trials/files.h"
-#include "master/command/console.h"
 
 namespace gapfarm {
 
@@ -53,11 +51,7 @@ std::string state_of_exit(int exit_code) {
 
 }  // namespace
 
-std::string command_line() {
-  std::string text = "gapfarm";
-  for (const std::string& word : own_arguments()) text += " " + shell_quoted(word);
-  return text;
-}
+std::string command_line() { return "gapfarm " + joined(own_arguments(), " ", shell_quoted); }
 
 void KeepOption::declare(CLI::App& app) {
   app.add_option(
@@ -190,9 +184,7 @@ void LongCommand::stage(const std::string& name) {
 
 void LongCommand::found(Finding finding) {
   std::vector<StageFinding>& all = record_.findings;
-  const auto same = std::ranges::find_if(
-      all, [&](const StageFinding& f) { return f.found.about == finding.about; });
-  if (same != all.end()) all.erase(same);
+  std::erase_if(all, [&](const StageFinding& f) { return f.found.about == finding.about; });
   all.push_back({stage_, std::move(finding)});
   write_record();
 }
@@ -292,9 +284,7 @@ std::string out_of(const CLI::App& command) {
   std::string out = value_of(command, "--out");
   if (out.empty()) out = value_of(command, "RUN");
   if (out.empty() || out == "-") return {};
-  std::error_code code;
-  const auto whole = std::filesystem::absolute(out, code);
-  return code ? out : whole.string();
+  return whole_path(out);
 }
 
 // Its exit status, or what kept it from starting.
@@ -304,10 +294,9 @@ Result<int> run_shell(const std::string& text, const std::vector<std::string>& v
   setup.environment = variables;
   setup.in = STDIN_FILENO;
   setup.death_signal = 0;
-  const Result<pid_t> pid = start_child(setup);
-  if (!pid) return Error{"cannot start it: " + pid.error().message};
+  ASSIGN_OR_RETURN(const pid_t pid, under("cannot start it", start_child(setup)));
   int status = 0;
-  await_child(*pid, std::numeric_limits<double>::infinity(), &status);
+  await_child(pid, std::numeric_limits<double>::infinity(), &status);
   return WIFEXITED(status) ? WEXITSTATUS(status) : kExitSignalBase + WTERMSIG(status);
 }
 
@@ -337,7 +326,7 @@ void conclude_command(const CLI::App& command, int exit_code, CliContext& contex
                        "GAPFARM_STATE=" + state_of_exit(exit_code),
                        "GAPFARM_EXIT=" + std::to_string(exit_code)});
   if (!status) {
-    context.console.error(Error{"--on-end: " + status.error().message});
+    context.console.error(under("--on-end", status).error());
   } else if (*status != 0) {
     context.console.error(
         Error{"--on-end: the command ended with status " + std::to_string(*status)});

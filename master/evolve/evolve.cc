@@ -4,6 +4,7 @@
 #include <sstream>
 #include <unordered_map>
 
+#include "common/base/ranges.h"
 #include "master/evolve/islands.h"
 #include "master/ground/fit/kinematic_baseline.h"
 
@@ -58,10 +59,8 @@ OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem&
     return setup;
   }
   // Where kinematics show a value, no generation need look for it.
-  const ParameterValues start = settings.seed_nominal ? kinematic_start(problem) : problem.values;
-  for (const Gene& gene : setup.genes) {
-    setup.nominal.push_back(encode_gene(*setup.table, gene, start[gene.row]));
-  }
+  setup.nominal =
+      problem.genome_of(settings.seed_nominal ? kinematic_start(problem) : problem.values);
   return setup;
 }
 
@@ -203,7 +202,7 @@ class IslandLoop {
         waited.missing = lot.candidates.size();
         waited.scores.resize(waited.missing);
         for (std::size_t i = 0; i < waited.missing; ++i) places_[next_place_++] = {lot.island, i};
-        candidates.insert(candidates.end(), lot.candidates.begin(), lot.candidates.end());
+        append(candidates, lot.candidates);
       }
       ASSIGN_OR_RETURN(advanced, commit_next());
     }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/base/hash.h"
+#include "common/base/ranges.h"
 
 namespace gapfarm {
 namespace {
@@ -174,8 +175,7 @@ std::uint64_t SeenGenomes::key(const Genome& genome) {
 }
 
 const Standing* SeenGenomes::find(const Genome& genome) const {
-  const auto found = standings_.find(key(genome));
-  return found == standings_.end() ? nullptr : &found->second;
+  return find_in(standings_, key(genome));
 }
 
 void SeenGenomes::remember(const Genome& genome, const Standing& standing) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 
+#include "common/base/ranges.h"
 #include "gapfarm/v1/record.pb.h"
 #include "master/evolve/individual.h"
 #include "master/evolve/methods/cma_es.h"
@@ -86,19 +87,21 @@ class IslandsOptimiser final : public Optimiser, public Islands {
 
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override {
-    std::uint64_t sum = 0;
-    for (const Island& island : islands_) sum += island.now.evaluations;
-    return sum;
+    return sum_of(islands_, [](const Island& island) { return island.now.evaluations; });
   }
   std::uint64_t last_improvement() const override { return last_improvement_; }
   std::vector<Individual> members() const override;
   const Individual& best() const override { return best_; }
-  double diversity() const override;
+  double diversity() const override { return diversity_of(all_members()); }
   std::vector<NamedNumber> operator_probabilities() const override;
   std::string state() const override;
   Status restore(std::string_view state) override;
 
  private:
+  std::vector<Individual> all_members() const {
+    return flattened(
+        islands_, [](const Island& one) -> auto& { return one.now.members; });
+  }
   using Shown = std::vector<std::vector<Individual>>;  // best first, one of each island
 
   OptimiserSetup setup_of(const OptimiserSetup& whole, std::size_t island) const;
@@ -214,9 +217,8 @@ void IslandsOptimiser::tell_island(std::size_t i, std::span<const Score> scores)
 }
 
 bool IslandsOptimiser::advance() {
-  for (const Island& island : islands_) {
-    if (island.ahead.empty()) return false;
-  }
+  const auto waits = [](const Island& island) { return island.ahead.empty(); };
+  if (std::ranges::any_of(islands_, waits)) return false;
   const bool first = generation_++ == 0;
   const Individual before = best_;
   for (Island& island : islands_) {
@@ -233,11 +235,7 @@ bool IslandsOptimiser::advance() {
 
 std::vector<Candidate> IslandsOptimiser::ask() {
   if (asked_.empty()) asked_ = begin(generation_ + 1);
-  std::vector<Candidate> candidates;
-  for (const Lot& lot : asked_) {
-    candidates.insert(candidates.end(), lot.candidates.begin(), lot.candidates.end());
-  }
-  return candidates;
+  return flattened(asked_, &Lot::candidates);
 }
 
 void IslandsOptimiser::tell(std::span<const Score> scores) {
@@ -251,34 +249,21 @@ void IslandsOptimiser::tell(std::span<const Score> scores) {
 }
 
 std::vector<Individual> IslandsOptimiser::members() const {
-  std::vector<Individual> members;
-  for (const Island& island : islands_) {
-    members.insert(members.end(), island.now.members.begin(), island.now.members.end());
-  }
+  std::vector<Individual> members = all_members();
   std::ranges::stable_sort(members, better_individual);
   const auto best = std::ranges::find(members, best_.birth_id, &Individual::birth_id);
   if (best != members.end()) std::rotate(members.begin(), best, best + 1);
   return members;
 }
 
-double IslandsOptimiser::diversity() const {
-  std::vector<Individual> all;
-  for (const Island& island : islands_) {
-    all.insert(all.end(), island.now.members.begin(), island.now.members.end());
-  }
-  return diversity_of(all);
-}
-
 // The mean over the islands.
 std::vector<NamedNumber> IslandsOptimiser::operator_probabilities() const {
   std::vector<NamedNumber> mean = islands_.front().now.figures;
   for (NamedNumber& figure : mean) {
-    double sum = 0;
-    for (const Island& island : islands_) {
-      for (const NamedNumber& its : island.now.figures) {
-        if (its.name == figure.name) sum += its.value;
-      }
-    }
+    const double sum = sum_of(islands_, [&](const Island& island) {
+      const NamedNumber* its = find_by(island.now.figures, figure.name, &NamedNumber::name);
+      return its ? its->value : 0;
+    });
     figure.value = sum / static_cast<double>(islands_.size());
   }
   return mean;

@@ -1,6 +1,5 @@
 #include "master/evolve/optimisers.h"
 
-#include <algorithm>
 #include <array>
 #include <cassert>
 

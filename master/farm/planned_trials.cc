@@ -30,10 +30,8 @@ constexpr double kFingerClearance_m = 0.03;  // of its start from the circle rou
 // to half the piece's radius, and on to at most as far behind it.
 void draw_finger(const Piece& piece, Stream& stream, Trial& trial) {
   const Eigen::Vector2d middle = centroid(piece);
-  double radius = 0;
-  for (const Eigen::Vector2d& corner : piece.corners) {
-    radius = std::max(radius, (corner - middle).norm());
-  }
+  const double radius =
+      max_of(piece.corners, [&](const auto& corner) { return (corner - middle).norm(); });
   const Pose X_WC = trial.X_WS * Pose{middle[0], middle[1], 0};
   const double reach = radius + kFingerClearance_m;
   const Pose X_WF = X_WC * Pose{0, 0, stream.uniform(-std::numbers::pi, std::numbers::pi)};

@@ -85,8 +85,8 @@ WorkerRegistry::Admission WorkerRegistry::admit(const std::string& peer, const v
 }
 
 WorkerRecord* WorkerRegistry::find_peer(const std::string& peer) {
-  const auto found = by_peer_.find(peer);
-  return found == by_peer_.end() ? nullptr : found->second;
+  const auto* found = find_in(by_peer_, peer);
+  return found ? *found : nullptr;
 }
 
 WorkerRecord* WorkerRegistry::find_name(const std::string& name) const {
@@ -100,11 +100,9 @@ WorkerRecord* WorkerRegistry::find(WorkerId id) {
 }
 
 std::vector<WorkerId> WorkerRegistry::silent_since(double now, double limit) const {
-  std::vector<WorkerId> silent;
-  for (const auto& [id, worker] : workers_) {
-    if (now - worker->last_heard > limit) silent.push_back(id);
-  }
-  return silent;
+  return filtered(
+      workers_, [&](auto& one) { return now - one.second->last_heard > limit; },
+      [](auto& one) { return one.first; });
 }
 
 void WorkerRegistry::forgive(double now) {
@@ -132,7 +130,7 @@ std::vector<WorkerStatus> WorkerRegistry::status(double now) const {
     const char* state = worker->leaving ? "leaving" : worker->holds.empty() ? "idle" : "busy";
     all.push_back(status_of(*worker, state, now));
   }
-  all.insert(all.end(), gone_.begin(), gone_.end());
+  append(all, gone_);
   return all;
 }
 
@@ -157,11 +155,9 @@ bool FleetRegistry::hear(const std::string& peer, const v1::Fleet& report, doubl
 }
 
 std::vector<FleetStatus> FleetRegistry::status(double now) const {
-  std::vector<FleetStatus> all;
-  for (const auto& [name, heard] : fleets_) {
-    if (now - heard.at <= kHeardFor_s) all.push_back(heard.status);
-  }
-  return all;
+  return filtered(
+      fleets_, [&](auto& one) { return now - one.second.at <= kHeardFor_s; },
+      [](auto& one) { return one.second.status; });
 }
 
 std::vector<std::string> FleetRegistry::peers() const {

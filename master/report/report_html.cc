@@ -137,9 +137,7 @@ std::vector<Stretch> stretches(const GapSplit& split, bool before) {
 }
 
 double drawn_total(const GapSplit& split, bool before) {
-  double total = 0;
-  for (const Stretch& stretch : stretches(split, before)) total += stretch.length;
-  return total;
+  return sum_of(stretches(split, before), &Stretch::length);
 }
 
 // One stacked bar; its parts also stand in the table below, so it is hidden from screen readers.

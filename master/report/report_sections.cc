@@ -217,8 +217,8 @@ std::string screening_section(const Diagnosis& diagnosis) {
   // A gain that is not a number sorts last, so that the comparison stays an order.
   const auto key = [](const Screened* s) { return std::isfinite(s->gain) ? s->gain : -1e300; };
   std::ranges::stable_sort(order, [&](const auto* a, const auto* b) { return key(a) > key(b); });
-  std::vector<HtmlRow> rows;
-  for (const Screened* s : order) rows.push_back(screened_row(diagnosis, *s, largest));
+  const auto rows =
+      mapped(order, [&](const Screened* s) { return screened_row(diagnosis, *s, largest); });
   return html_section(
       "screening", "Which effect: the whole catalogue",
       R"(<p>What each effect could add to the )"

@@ -238,9 +238,9 @@ Status StoreSink::commit(const GenerationRecord& record) {
   StoredGeneration stored;
   stored.generation = record.generation;
   stored.diversity = record.diversity;
-  for (const NamedNumber& p : record.operator_probabilities) {
-    stored.operator_probabilities.emplace_back(p.name, p.value);
-  }
+  stored.operator_probabilities = mapped(record.operator_probabilities, [](const NamedNumber& p) {
+    return NamedValue{p.name, p.value};
+  });
   stored.evaluations = record.evaluations;
   stored.wall_s = record.wall_s;
   stored.quarantined = static_cast<unsigned>(farm_.given_up() - quarantined_);

@@ -7,12 +7,12 @@
 #include <filesystem>
 
 #include "common/base/clock.h"
+#include "common/base/ranges.h"
 #include "common/trials/read.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/optimisers.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/simulated_start.h"
-#include "master/run/baseline_notes.h"
 #include "master/run/run_page.h"
 
 namespace gapfarm {
@@ -244,13 +244,87 @@ Result<std::vector<ScoreRow>> validate(Farm& farm, const Problem& apart,
   }
   rows.push_back({"the best", {}});
   genomes.push_back(best);
-  std::vector<v1::Task> tasks;
-  for (const Genome& genome : genomes) tasks.push_back(evaluation_task({0, 0, genome}, 0));
-  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(apart)), tasks));
+  const auto task_of = [](const Genome& genome) { return evaluation_task({0, 0, genome}, 0); };
+  ASSIGN_OR_RETURN(const auto results,
+                   farm.run(farm.add_problem(to_proto(apart)), mapped(genomes, task_of)));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (results[i].outcome() == v1::OK) rows[i].score = results[i].evaluate().fitness();
   }
   return rows;
+}
+
+namespace {
+
+// Of trials that the model was fitted to.  A baseline has a handful of numbers a command: fitted to
+// the trials that it is scored on it would look better than it is.
+constexpr const char* kFromOthers =
+    "learned from the other sessions or parts of the log (the model has seen all of it)";
+
+bool same_trials(const TrialLog& a, const TrialLog& b) {
+  const auto same = [](const Trial& s, const Trial& t) {
+    return s.session == t.session && s.trial == t.trial && s.command == t.command &&
+           s.X_WS.x == t.X_WS.x && s.X_WE.x == t.X_WE.x && s.X_WE.y == t.X_WE.y;
+  };
+  return std::equal(a.trials.begin(), a.trials.end(), b.trials.begin(), b.trials.end(), same);
+}
+
+std::string note(const std::vector<BaselineComparison>& baselines, const std::string& how) {
+  const std::string sentence = baseline_sentence(baselines, "the model");
+  return sentence.empty() ? sentence : "without a simulation, " + how + ": " + sentence;
+}
+
+// Whether a scenario's commands can repeat, so that there is something to learn from repeats.
+bool has_baselines(std::string_view scenario) {
+  const ScenarioForm& form = scenario_form(scenario);
+  return !form.pieces && form.commands().size() > 1;
+}
+
+// The trials that a model was fitted to, where its files are still at hand and hold as many.
+std::optional<TrialLog> trials_behind(const Model& model) {
+  std::error_code code;
+  for (const std::string& file : model.data.files) {
+    if (!std::filesystem::is_regular_file(file, code)) return std::nullopt;
+  }
+  if (model.data.files.empty()) return std::nullopt;
+  auto log = read_trial_files(model.data.files, command_names(model.commands));
+  if (!log || log->trials.size() != model.data.trials) return std::nullopt;
+  return *std::move(log);
+}
+
+}  // namespace
+
+Result<std::string> baseline_note(const Model& model, const TrialLog& log,
+                                  std::span<const double> scores) {
+  if (!has_baselines(model.scenario) || log.trials.empty()) return std::string();
+  const auto behind = trials_behind(model);
+  if (behind && !same_trials(*behind, log)) {
+    ASSIGN_OR_RETURN(const auto baselines, baseline_scores(*behind, log, model.commands));
+    return note(compare_with_baselines(baselines, scores), "learned from the model's trials");
+  }
+  ASSIGN_OR_RETURN(const auto baselines,
+                   crossfitted_baselines(log, model.commands, session_folds(log)));
+  return note(compare_with_baselines(baselines, scores),
+              behind ? kFromOthers : "learned from the other sessions of this log");
+}
+
+Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& genome, Farm& farm) {
+  if (!has_baselines(problem.scenario) || problem.log.trials.empty()) return std::string();
+  ASSIGN_OR_RETURN(const auto results,
+                   farm.run(farm.add_problem(to_proto(problem)), {prediction_task(genome, false)}));
+  if (results.front().outcome() != v1::OK) return std::string();
+  ASSIGN_OR_RETURN(const auto beside, baselines_beside(problem, results.front().predict()));
+  return note(beside, kFromOthers);
+}
+
+Result<std::vector<BaselineComparison>> baselines_beside(const Problem& problem,
+                                                         const v1::PredictResult& prediction) {
+  if (!has_baselines(problem.scenario) || problem.log.trials.empty()) {
+    return std::vector<BaselineComparison>();
+  }
+  const auto scores = mapped(prediction.predictions(), &v1::Predicted::log_score);
+  ASSIGN_OR_RETURN(const auto baselines, crossfitted_baselines(problem.log, problem.commands,
+                                                               session_folds(problem.log)));
+  return compare_with_baselines(baselines, scores);
 }
 
 }  // namespace gapfarm

@@ -4,14 +4,17 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/config/config.h"
+#include "common/config/model.h"
 #include "common/config/settings.h"
 #include "common/log/log.h"
 #include "common/problem/problem.h"
+#include "common/score/baselines.h"
 #include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
 #include "master/farm/farm.h"
@@ -65,5 +68,21 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
 // Says in the store that the run stopped by this error, which it returns.  `last`: what else its
 // live row says.
 Error stopped_by(RunStore& store, Error error, const Progress& last = {});
+
+// What predictions without a simulation score, beside a model: notes for people.
+
+// Beside the model's log scores, one a trial of `log`; empty where no command repeats enough or
+// baselines make no sense.  Learned from the trials behind the model; where those are not at hand,
+// or are the same, from the other sessions of `log`.  The sentence says which.
+Result<std::string> baseline_note(const Model& model, const TrialLog& log,
+                                  std::span<const double> scores);
+
+// Beside the log scores that the problem's own trials have at a genome, each baseline learned from
+// the other sessions; empty also where the genome's simulation does not end well.
+Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& genome, Farm& farm);
+
+// The same beside a prediction of the problem's trials; none where baselines make no sense.
+Result<std::vector<BaselineComparison>> baselines_beside(const Problem& problem,
+                                                         const v1::PredictResult& prediction);
 
 }  // namespace gapfarm

@@ -184,7 +184,7 @@ void add_facts(const RunStatus& status, RunFarm* farm) {
   if (const std::string start = search_start_text(status.info); !start.empty()) {
     add("began at", start);
   }
-  add("evaluations", std::to_string(status.evaluations));
+  add("evaluations", std::to_string(status.last.evaluations));
   if (status.state == RunState::kRunning) {
     add("rate", fmt::format("{:.3g} evaluations/s", status.rate_per_s));
     add("tasks of this generation", fmt::format("{} of {}", progress.done, progress.total));

@@ -18,7 +18,6 @@
 #include "common/trials/files.h"
 #include "master/report/html.h"
 #include "master/report/prediction_table.h"
-#include "master/run/baseline_notes.h"
 #include "master/run/stored_run.h"
 
 namespace gapfarm {

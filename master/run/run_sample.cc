@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/json/json.h"
 #include "common/math/rank_tests.h"
 #include "common/math/statistics.h"
@@ -24,11 +25,9 @@ std::vector<std::vector<double>> ranks_of(const std::vector<const StoredIndividu
                                           std::size_t objectives) {
   std::vector<std::vector<double>> columns(std::max<std::size_t>(1, objectives));
   for (std::size_t m = 0; m < columns.size(); ++m) {
-    std::vector<double> values;
-    for (const StoredIndividual* one : members) {
-      values.push_back(objectives > 0 ? one->objectives[m].second : *one->fitness);
-    }
-    columns[m] = mean_ranks(values);
+    columns[m] = mean_ranks(mapped(members, [&](const StoredIndividual* one) {
+      return objectives > 0 ? one->objectives[m].second : *one->fitness;
+    }));
   }
   return columns;
 }
@@ -155,11 +154,9 @@ RunSample run_sample(const Problem& problem, const std::vector<StoredIndividual>
     const Parameter& p = problem.table()[gene.row];
     RunSample::GeneShare& share = sample.genes.emplace_back(RunSample::GeneShare{
         p.key, p.unit, gene.lower, gene.upper, gene.scale == ParameterScale::kLog, {}});
-    std::vector<double> values;
-    for (const StoredIndividual* one : whole) values.push_back(one->genome[g]);
-    for (const std::vector<double>& output : ranks) {
-      share.importance.push_back(first_order_index(values, output));
-    }
+    const auto values = mapped(whole, [&](const auto* one) { return one->genome[g]; });
+    share.importance =
+        mapped(ranks, [&](const auto& output) { return first_order_index(values, output); });
   }
   const std::size_t each = whole.size() / kMostEvaluated + 1;
   for (std::size_t i = 0; i < whole.size(); i += each) sample.evaluated.push_back(*whole[i]);

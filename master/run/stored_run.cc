@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/config/config.h"
 #include "common/json/json.h"
@@ -53,11 +54,7 @@ SearchStart stored_start(const RunInfo& info, std::size_t genes) {
   const Json json = search_start(info);
   if (!json.is_object()) return start;
   const auto numbers = [](const Json& list) {
-    std::vector<double> values;
-    for (const Json& value : list) {
-      if (value.is_number()) values.push_back(value.get<double>());
-    }
-    return values;
+    return filtered(list, &Json::is_number, [](const Json& value) { return value.get<double>(); });
   };
   for (const Json& genome : json.value("genomes", Json::array())) {
     if (genome.size() == genes) start.genomes.push_back(numbers(genome));

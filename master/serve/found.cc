@@ -78,54 +78,43 @@ void count_workers(const std::vector<WorkerStatus>& workers, bool running, WorkE
   }
 }
 
-void read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
-  const auto reader = RunReader::open(found.path);
-  if (!reader) {
-    entry->trouble = reader.error().message;
-    return;
-  }
-  const auto status = run_status(*reader, now_unix_s);
-  if (!status) {
-    entry->trouble = status.error().message;
-    return;
-  }
-  const Progress& progress = status->progress;
-  entry->state = run_state_name(status->state);
-  const bool running = status->state == RunState::kRunning;
-  entry->status_text = running ? progress.waiting : status->stop_reason;
-  entry->fitness = status->info.fitness;
-  entry->unit = status->info.fitness_unit;
-  entry->higher_is_better = status->info.higher_is_better;
-  entry->best = status->best;
-  const auto& all = status->best_by_generation;
+Status read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(found.path));
+  ASSIGN_OR_RETURN(const auto status, run_status(reader, now_unix_s));
+  const Progress& progress = status.progress;
+  entry->state = run_state_name(status.state);
+  const bool running = status.state == RunState::kRunning;
+  entry->status_text = running ? progress.waiting : status.stop_reason;
+  entry->fitness = status.info.fitness;
+  entry->unit = status.info.fitness_unit;
+  entry->higher_is_better = status.info.higher_is_better;
+  entry->best = status.last.best;
+  const auto& all = status.best_by_generation;
   const std::size_t each = std::max<std::size_t>(1, (all.size() + kMostPoints - 1) / kMostPoints);
   for (std::size_t i = all.size(); i > 0; i -= std::min(i, each)) {
     if (all[i - 1])
       entry->best_by_generation.insert(entry->best_by_generation.begin(), *all[i - 1]);
   }
-  entry->generation = status->generation;
-  entry->evaluations = status->evaluations;
-  entry->trials = trials_of(status->info);
-  entry->seed = status->info.seed;
-  entry->config = status->info.config_path;
-  entry->rate_per_s = running ? status->rate_per_s : 0;
-  entry->time_left_s = running ? status->time_left_s : std::nullopt;
-  entry->given_up = status->quarantined;
+  entry->generation = status.last.generation;
+  entry->evaluations = status.last.evaluations;
+  entry->trials = trials_of(status.info);
+  entry->seed = status.info.seed;
+  entry->config = status.info.config_path;
+  entry->rate_per_s = running ? status.rate_per_s : 0;
+  entry->time_left_s = running ? status.time_left_s : std::nullopt;
+  entry->given_up = status.quarantined;
   entry->farm = progress.farm;
   entry->tasks = running ? progress.total : 0;
   entry->tasks_done = running ? progress.done : 0;
   entry->changed_unix_s = progress.heartbeat_unix_s;
   count_workers(progress.workers, running, entry);
+  return {};
 }
 
-void read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
-  const auto record = command_status(found.path, now_unix_s);
-  if (!record) {
-    entry->trouble = record.error().message;
-    return;
-  }
-  if (!*record) return;
-  const CommandRecord& r = **record;
+Status read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
+  ASSIGN_OR_RETURN(const auto record, command_status(found.path, now_unix_s));
+  if (!record) return {};
+  const CommandRecord& r = *record;
   const bool running = r.state == "running";
   entry->what = r.command.empty() ? entry->what : r.command;
   entry->state = r.state;
@@ -138,6 +127,7 @@ void read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry
   entry->tasks = running ? r.total : 0;
   entry->tasks_done = running ? r.done : 0;
   count_workers(r.workers, running, entry);
+  return {};
 }
 
 // The headline alone: trials and drives stay unread.
@@ -181,12 +171,10 @@ WorkEntry entry_of(const FoundWork& found, double now_unix_s) {
   entry.what = found.kind == FoundWork::Kind::kRun         ? "run"
                : found.kind == FoundWork::Kind::kDiagnosis ? "diagnosis"
                                                            : "command";
-  if (found.kind == FoundWork::Kind::kRun) {
-    read_run(found, now_unix_s, &entry);
-    return entry;
-  }
-  std::error_code ignored;
-  if (fs::exists(answer_file(found.path), ignored)) read_command_of(found, now_unix_s, &entry);
+  const bool run = found.kind == FoundWork::Kind::kRun;
+  const Status read =
+      run ? read_run(found, now_unix_s, &entry) : read_command_of(found, now_unix_s, &entry);
+  if (!read) entry.trouble = read.error().message;
   if (found.kind == FoundWork::Kind::kDiagnosis && entry.state != "running") {
     read_headline(found, &entry);
   }

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <string>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -297,11 +296,13 @@ class MetricsPage {
   std::string last_;
 };
 
+using Metric = std::optional<double>;  // none: there is no line of it
+
 struct MetricRow {
   const char* name;
   MetricsPage::Type type;
   const char* help;
-  double (*of)(const WorkEntry& entry, double now_unix_s);
+  Metric (*of)(const WorkEntry& entry, double now_unix_s);
 };
 
 constexpr auto kGauge = MetricsPage::kGauge;
@@ -309,30 +310,26 @@ constexpr auto kCounter = MetricsPage::kCounter;
 
 constexpr MetricRow kMetricRows[] = {
     {"running", kGauge, "1 while its process lives.",
-     [](const WorkEntry& e, double) { return e.state == "running" ? 1.0 : 0.0; }},
+     [](const WorkEntry& e, double) -> Metric { return e.state == "running" ? 1 : 0; }},
     {"heartbeat_age_seconds", kGauge, "Since its process was last heard of.",
-     [](const WorkEntry& e, double now_unix_s) { return now_unix_s - e.changed_unix_s; }},
+     [](const WorkEntry& e, double now_unix_s) -> Metric { return now_unix_s - e.changed_unix_s; }},
     {"generation", kGauge, "Generations committed.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.generation); }},
+     [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.generation); }},
     {"evaluations_total", kCounter, "Evaluations committed, since the run began.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.evaluations); }},
+     [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.evaluations); }},
     {"evaluations_per_second", kGauge, "Of a command that is no run: simulations.",
-     [](const WorkEntry& e, double) { return e.rate_per_s; }},
+     [](const WorkEntry& e, double) -> Metric { return e.rate_per_s; }},
     {"tasks", kGauge, "Tasks of the generation or stage under way.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.tasks); }},
+     [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.tasks); }},
     {"tasks_done", kGauge, "Those of them that are answered.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.tasks_done); }},
+     [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.tasks_done); }},
     {"quarantined_total", kCounter, "Tasks that were given up.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.given_up); }},
+     [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.given_up); }},
+    {"best_fitness", kGauge, "In its own sense and unit.",
+     [](const WorkEntry& e, double) { return e.best; }},
+    {"time_left_seconds", kGauge, "Until it is done.",
+     [](const WorkEntry& e, double) { return e.time_left_s; }},
 };
-
-void add_optional(const std::vector<WorkEntry>& entries, const char* name, const char* help,
-                  std::optional<double> WorkEntry::*value, MetricsPage* page) {
-  for (const WorkEntry& e : entries) {
-    if (!e.trouble.empty() || !(e.*value)) continue;
-    page->add(name, kGauge, help, MetricsPage::label("of", e.name), *(e.*value));
-  }
-}
 
 void add_farms(const std::vector<WorkEntry>& entries, MetricsPage* page) {
   for (const char* state : {"busy", "idle", "gone"}) {
@@ -360,13 +357,10 @@ std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_
   MetricsPage page;
   for (const MetricRow& row : kMetricRows) {
     for (const WorkEntry& e : entries) {
-      if (!e.trouble.empty()) continue;
-      page.add(row.name, row.type, row.help, MetricsPage::label("of", e.name),
-               row.of(e, now_unix_s));
+      const auto value = e.trouble.empty() ? row.of(e, now_unix_s) : std::nullopt;
+      if (value) page.add(row.name, row.type, row.help, MetricsPage::label("of", e.name), *value);
     }
   }
-  add_optional(entries, "best_fitness", "In its own sense and unit.", &WorkEntry::best, &page);
-  add_optional(entries, "time_left_seconds", "Until it is done.", &WorkEntry::time_left_s, &page);
   add_farms(entries, &page);
   return page.text();
 }

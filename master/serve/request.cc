@@ -65,8 +65,8 @@ HttpResponse plain_response(unsigned status, std::string text) {
 }
 
 std::string Target::value(const std::string& key) const {
-  const auto found = query.find(key);
-  return found == query.end() ? std::string() : found->second.front();
+  const auto* values = find_in(query, key);
+  return values ? values->front() : std::string();
 }
 
 Result<Target> parse_target(std::string_view target) {

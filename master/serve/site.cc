@@ -48,11 +48,9 @@ ListView list_view(const Target& target) {
 std::string key_of(const Target& target) {
   std::string key = target.path;
   for (const char* name : {"of", "sort", "q", "state", "genome", "best_of"}) {
-    const auto values = target.query.find(name);
-    if (values == target.query.end()) continue;
-    for (const std::string& value : values->second) {
-      key += std::string("&") + name + "=" + percent_encoded(value);
-    }
+    const auto* values = find_in(target.query, name);
+    if (!values) continue;
+    for (const std::string& v : *values) key += std::string("&") + name + "=" + percent_encoded(v);
   }
   return key;
 }

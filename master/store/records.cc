@@ -77,10 +77,9 @@ std::string readable_values(const Problem& problem, const Genome& genome) {
 }
 
 void summarise_fitness(StoredGeneration& generation, bool higher_is_better) {
-  std::vector<double> fitness;
-  for (const StoredIndividual& individual : generation.individuals) {
-    if (individual.fitness) fitness.push_back(*individual.fitness);
-  }
+  auto fitness = filtered(
+      generation.individuals, [](auto& individual) { return individual.fitness.has_value(); },
+      [](auto& individual) { return *individual.fitness; });
   generation.best = generation.mean = generation.median = generation.worst = std::nullopt;
   if (fitness.empty()) return;
   generation.best = generation.individuals.front().fitness;
@@ -181,7 +180,7 @@ Json values_json(const StoredIndividual& member) {
 }
 
 Json to_json(const RunFront& front) {
-  Json objectives = Json::array(), members = Json::array(), volumes = Json::array();
+  Json objectives = Json::array(), members = Json::array();
   const auto at = [](const std::vector<double>& values, std::size_t m) {
     return m < values.size() ? Json(values[m]) : Json(nullptr);
   };
@@ -200,15 +199,12 @@ Json to_json(const RunFront& front) {
                        {"fitness", number_or_null(member.fitness)},
                        {"values", values_json(member)}});
   }
-  for (const std::optional<double>& volume : front.hypervolume) {
-    volumes.push_back(number_or_null(volume));
-  }
   const Json knee =
       front.members.empty() ? Json(nullptr) : Json(front.members[front.knee].birth_id);
   return {{"objectives", std::move(objectives)},
           {"knee", knee},
           {"members", std::move(members)},
-          {"hypervolume", std::move(volumes)}};
+          {"hypervolume", mapped(front.hypervolume, number_or_null)}};
 }
 
 namespace {

@@ -246,21 +246,14 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.quarantined += generation.quarantined;
   }
   ASSIGN_OR_RETURN(status.incidents, reader.incidents());
-  if (!generations.empty()) {
-    const StoredGeneration& last = generations.back();
-    status.generation = last.generation;
-    status.evaluations = last.evaluations;
-    status.best = last.best;
-    status.mean = last.mean;
-    status.worst = last.worst;
-    status.digest = last.digest;
-  }
+  if (!generations.empty()) status.last = generations.back();
   for (const Incident& incident : status.incidents) {
-    const bool counted = incident.generation <= status.generation;  // with its generation
+    const bool counted = incident.generation <= status.last.generation;  // with its generation
     status.quarantined += incident.kind == IncidentKind::kQuarantine && !counted ? 1 : 0;
   }
   // By number, not "the last": another generation may have been committed meanwhile.
-  ASSIGN_OR_RETURN(std::vector<StoredIndividual> members, reader.individuals(status.generation));
+  ASSIGN_OR_RETURN(std::vector<StoredIndividual> members,
+                   reader.individuals(status.last.generation));
   status.best_individual = best_of(std::move(members));
 
   ASSIGN_OR_RETURN(status.front, run_front(reader, generations));
@@ -277,7 +270,7 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.time_left_s = status.progress.time_left_s;
   } else {
     // Of a run that is over, what it did on the whole.
-    const double evaluations = static_cast<double>(status.evaluations);
+    const double evaluations = static_cast<double>(status.last.evaluations);
     status.rate_per_s = status.wall_s > 0 ? evaluations / status.wall_s : 0;
     if (status.state == RunState::kFinished) status.time_left_s = 0;
     status.progress.leave();
@@ -314,14 +307,14 @@ Json to_json(const RunStatus& status) {
   json["state"] = run_state_name(status.state);
   json["stop_reason"] = status.stop_reason;
   json["waiting"] = status.state == RunState::kRunning ? status.progress.waiting : "";
-  json["generation"] = status.generation;
-  json["evaluations"] = status.evaluations;
-  json["best_fitness"] = number_or_null(status.best);
-  json["mean_fitness"] = number_or_null(status.mean);
-  json["worst_fitness"] = number_or_null(status.worst);
+  json["generation"] = status.last.generation;
+  json["evaluations"] = status.last.evaluations;
+  json["best_fitness"] = number_or_null(status.last.best);
+  json["mean_fitness"] = number_or_null(status.last.mean);
+  json["worst_fitness"] = number_or_null(status.last.worst);
   json["rate_per_s"] = status.rate_per_s;
   json["time_left_s"] = number_or_null(status.time_left_s);
-  json["digest"] = status.digest;
+  json["digest"] = status.last.digest;
   json["workers"] = workers_json(status.progress.workers);
   json["quarantined"] = status.quarantined;
   Json& incidents = json["incidents"] = Json::array();

@@ -85,14 +85,11 @@ Json to_json(const RunFront& front);
 
 struct RunStatus {
   RunState state = RunState::kStopped;
-  std::string stop_reason;        // "" while running; "crashed: ..." when the master just went
-  std::uint64_t generation = 0;   // last committed; 0: none
-  std::uint64_t evaluations = 0;  // committed
-  double wall_s = 0;              // spent on committed generations
-  std::optional<double> best, mean, worst;  // fitness of the last committed generation
+  std::string stop_reason;  // "" while running; "crashed: ..." when the master just went
+  StoredGeneration last;    // committed, without its members; number 0: none
+  double wall_s = 0;        // spent on committed generations
   double rate_per_s = 0;
   std::optional<double> time_left_s;
-  std::string digest;               // empty: nothing committed
   std::uint64_t quarantined = 0;    // tasks given up, with those of the generation in work
   std::vector<Incident> incidents;  // in the order in which they happened
   Progress progress;

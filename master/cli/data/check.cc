@@ -104,15 +104,17 @@ Status find_idle_genes(const Config& config, unsigned workers, CliContext& conte
 }
 
 // Effects that are on in the config's own values or that a gene may turn on.
-std::vector<std::size_t> enabled_effects(const Problem& problem) {
+std::vector<std::string> enabled_effects(const Problem& problem) {
   const ParameterTable& table = problem.table();
-  std::vector<std::size_t> enabled;
+  std::vector<std::string> enabled;
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     const std::size_t first = table.effect_row(e);
     const std::size_t past = first + table.effects()[e].parameters.size();
     const bool searched = std::ranges::any_of(
         problem.genes, [&](const Gene& gene) { return gene.row >= first && gene.row < past; });
-    if (searched || !table.is_neutral(e, problem.values)) enabled.push_back(e);
+    if (searched || !table.is_neutral(e, problem.values)) {
+      enabled.push_back(table.effects()[e].name);
+    }
   }
   return enabled;
 }
@@ -123,9 +125,7 @@ Summary summarise(const Config& config) {
   for (const Trial& trial : problem.log.trials) ++summary.commands[trial.command];
   summary.trials = problem.log.trials.size();
   summary.sessions = count_sessions(problem.log);
-  for (const std::size_t e : enabled_effects(problem)) {
-    summary.effects.push_back(problem.table().effects()[e].name);
-  }
+  summary.effects = enabled_effects(problem);
   if (is_value(problem.fitness.kind)) return summary;
   summary.sanity = log_warnings(problem, config.trial_files);
   return summary;
@@ -137,7 +137,7 @@ unsigned motions_of(const Summary& summary) {
 }
 
 Json to_json(const Config& config, const Summary& summary, unsigned workers) {
-  Json genes = Json::array(), evaluated;
+  Json evaluated;
   if (const auto& result = summary.evaluated) {
     evaluated = {{"outcome", v1::Outcome_Name(result->outcome())}, {"message", result->message()}};
     if (result->outcome() == v1::OK) evaluated["fitness"] = result->evaluate().fitness();
@@ -145,14 +145,14 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
   Json idle = mapped(summary.idle, [&](const IdleGene& gene) -> Json {
     return {{"parameter", gene.key}, {"remedy", gene.remedy}};
   });
-  for (const Gene& gene : config.problem.genes) {
+  Json genes = mapped(config.problem.genes, [&](const Gene& gene) -> Json {
     const Parameter& row = config.problem.table()[gene.row];
-    genes.push_back({{"parameter", row.key},
-                     {"unit", row.unit},
-                     {"lower", gene.lower},
-                     {"upper", gene.upper},
-                     {"log_scale", gene.scale == ParameterScale::kLog}});
-  }
+    return {{"parameter", row.key},
+            {"unit", row.unit},
+            {"lower", gene.lower},
+            {"upper", gene.upper},
+            {"log_scale", gene.scale == ParameterScale::kLog}};
+  });
   return {
       {"config", config.path},
       {"scenario", config.problem.scenario},

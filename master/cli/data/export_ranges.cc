@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/json/matrix.h"
 #include "common/trials/files.h"
 #include "master/cli/data/export_source.h"
@@ -16,11 +17,8 @@ namespace {
 
 Result<Ranges> ranges_of_trials(const std::string& path) {
   ASSIGN_OR_RETURN(const auto text, read_text_file(path));
-  const auto diagnosis = parse_diagnosis(text);
-  if (!diagnosis) return Error{path + ": " + diagnosis.error().message};
-  auto ranges = ranges_of(*diagnosis);
-  if (!ranges) return Error{path + ": " + ranges.error().message};
-  return ranges;
+  ASSIGN_OR_RETURN(const auto diagnosis, under(path, parse_diagnosis(text)));
+  return under(path, ranges_of(diagnosis));
 }
 
 Result<Ranges> read_ranges(const std::string& source, Console& console) {
@@ -32,9 +30,7 @@ Result<Ranges> read_ranges(const std::string& source, Console& console) {
   GroundSource ground;
   if (values) {
     ground.robot = values->given;
-    for (const std::string& log : values->logs) {
-      ground.logs.push_back(path_from(values->folder, log));
-    }
+    ground.logs = mapped(values->logs, [&](auto& log) { return path_from(values->folder, log); });
   } else {
     ASSIGN_OR_RETURN(ground, read_ground_source(source, console));
   }

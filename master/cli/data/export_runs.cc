@@ -43,8 +43,7 @@ std::string file_of(const std::string& run) {
 
 // Row of a list that holds at a time; null before the first.
 const CommandRow* held_at(const std::vector<CommandRow>& rows, double t_s) {
-  const auto after = std::upper_bound(rows.begin(), rows.end(), t_s,
-                                      [](double t, const CommandRow& row) { return t < row.t_s; });
+  const auto after = std::ranges::upper_bound(rows, t_s, {}, &CommandRow::t_s);
   return after == rows.begin() ? nullptr : &*(after - 1);
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
@@ -101,10 +102,8 @@ Result<std::vector<std::string>> write_files(const std::string& out, const RunFi
                                    {"wheels.csv", files.wheels},
                                    {"gyro.csv", files.gyro},
                                    {"map.toml", map}};
-  std::vector<std::string> names;
-  for (const auto& [name, text] : all) {
-    if (!text.empty()) names.push_back(name);
-  }
+  const auto names = mapped(filtered(all, [](auto& file) { return !file.second.empty(); }),
+                            [](auto& file) { return file.first; });
   RETURN_IF_ERROR(outputs.plan_in(out, names));
   RETURN_IF_ERROR(outputs.write_in(out, all));
   return names;

@@ -40,7 +40,7 @@ Result<std::vector<DriveFacts>> read_controllers(const std::vector<std::string>&
   std::vector<DriveFacts> facts;
   for (const std::string& file : files) {
     ASSIGN_OR_RETURN(const ControllerFile read, parse_file(file, parse_controllers));
-    facts.insert(facts.end(), read.drives.begin(), read.drives.end());
+    append(facts, read.drives);
   }
   return facts;
 }
@@ -71,9 +71,7 @@ Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
       first = std::move(next);
       continue;
     }
-    for (std::string& disagreement : compare_readings(*first, robots[0], next, file)) {
-      first->disagreements.push_back(std::move(disagreement));
-    }
+    append(first->disagreements, compare_readings(*first, robots[0], next, file));
   }
   return *std::move(first);
 }
@@ -103,7 +101,7 @@ Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
   }
   RobotConfigTexts config_texts;
   const auto add = [](const std::vector<std::string>& sentences, std::vector<std::string>& to) {
-    for (const std::string& text : sentences) to.push_back(printable(text));
+    append(to, mapped(sentences, printable));
   };
   add(setup.files, config_texts.made_of);
   add(setup.controllers, config_texts.made_of);
@@ -122,13 +120,8 @@ Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
 }
 
 Status write_robot(const RobotSetup& setup, const RobotTexts& texts, const Outputs& outputs) {
-  const std::pair<const std::string*, const std::string*> files[] = {
-      {&setup.robot, &texts.robot}, {&setup.config, &texts.config}};
-  for (const auto& [path, text] : files) {
-    if (path->empty()) continue;
-    RETURN_IF_ERROR(outputs.write(*path, *text));
-  }
-  return {};
+  if (!setup.robot.empty()) RETURN_IF_ERROR(outputs.write(setup.robot, texts.robot));
+  return setup.config.empty() ? Status() : outputs.write(setup.config, texts.config);
 }
 
 std::string file_seen_from(const std::string& out, const std::string& file) {

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "common/json/json.h"
 #include "common/recordings/run.h"
 #include "master/command/inputs.h"
 #include "master/command/outputs.h"

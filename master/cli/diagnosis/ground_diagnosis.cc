@@ -56,10 +56,10 @@ Status read_reference(DiagnoseCommand* command, const Config& config, Console& c
                  config.problem.scenario + "; diagnose both logs, or use crossfit"};
   }
   ASSIGN_OR_RETURN(const auto folders, reference_folders(command->reference, console));
-  auto log = read_run_folders(folders, config.problem.ground->robot().channels);
-  if (!log) return Error{"--reference: " + log.error().message};
-  for (const std::string& note : log->notes) console.note("reference: " + note);
-  command->reference_log = std::move(*log);
+  ASSIGN_OR_RETURN(
+      command->reference_log,
+      under("--reference", read_run_folders(folders, config.problem.ground->robot().channels)));
+  for (const std::string& note : command->reference_log->notes) console.note("reference: " + note);
   return {};
 }
 

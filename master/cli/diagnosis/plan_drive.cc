@@ -155,12 +155,10 @@ std::string table_text(const DrivePlan& drive, const std::vector<NamedWidths>& o
 }
 
 Json widths_json(const std::vector<WidthsAt>& widths) {
-  Json all = Json::array();
-  for (const WidthsAt& at : widths) {
-    all.push_back(
-        {{"seconds", at.t_s}, {"widths", std::vector<double>(at.widths.begin(), at.widths.end())}});
-  }
-  return all;
+  return mapped(widths, [](const WidthsAt& at) -> Json {
+    return {{"seconds", at.t_s},
+            {"widths", std::vector<double>(at.widths.begin(), at.widths.end())}};
+  });
 }
 
 // For people, and for programs.
@@ -175,10 +173,10 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
           "{:.2g} m and {:.2g} rad a reading, {:.2g} m and {:.2g} rad after a metre\n",
           noise.position_m, noise.heading_rad, noise.travel, noise.turn) +
       table_text(drive, others);
-  Json json = {{"out", task.out}, {"values", Json::array()}};
-  for (const KinematicRow& row : drive.rows) {
-    json["values"].push_back({{"name", row.name}, {"unit", row.unit}});
-  }
+  Json json = {{"out", task.out}};
+  json["values"] = mapped(drive.rows, [](const KinematicRow& row) -> Json {
+    return {{"name", row.name}, {"unit", row.unit}};
+  });
   json["planned"] = widths_json(drive.widths);
   for (const NamedWidths& other : others) {
     json[other.name] = widths_json(other.widths);
@@ -208,8 +206,7 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
       "No drive of as many seconds of such moves makes them more than {:.0f} % narrower, for the "
       "wanted together, even if the pose were known between moves\n",
       std::ceil(100 * (1 - drive.best_share)));
-  std::size_t commands = 0;
-  for (const LoggedRun& run : drive.drive.runs) commands += run.commands.size();
+  const auto commands = sum_of(drive.drive.runs, [](auto& run) { return run.commands.size(); });
   text += fmt::format(
       "{}/commands.csv: {} commands in {} run(s), {:.1f} s; waypoints.csv: where the marker should "
       "be as each ends, from the middle of the floor, heading along x\n",

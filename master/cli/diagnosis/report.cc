@@ -45,9 +45,8 @@ std::string importance_text(const nlohmann::ordered_json& importance) {
 
 Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
   ASSIGN_OR_RETURN(const std::string text, read_text_file(from.string()));
-  const auto diagnosis = parse_diagnosis(text);
-  if (!diagnosis) return Error{from.string() + ": " + diagnosis.error().message};
-  return Page{report_html(*diagnosis), from, from.parent_path() / "report.html"};
+  ASSIGN_OR_RETURN(const auto diagnosis, under(from.string(), parse_diagnosis(text)));
+  return Page{report_html(diagnosis), from, from.parent_path() / "report.html"};
 }
 
 Result<Page> page_of_run(const std::filesystem::path& run) {

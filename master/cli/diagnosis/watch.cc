@@ -110,16 +110,14 @@ Status read_robots(const WatchCommand& command, std::vector<RobotFolder>* robots
 }
 
 std::string kind_of(const GroundRobot& robot) {
-  std::string kind = drive_names()[static_cast<std::size_t>(robot.drive)] + " commanded by";
-  for (const std::string& channel : robot.channels) kind += " " + channel;
-  return kind;
+  return drive_names()[static_cast<std::size_t>(robot.drive)] + " commanded by " +
+         joined(robot.channels, " ");
 }
 
 // Robots of another kind than most are omitted.
 void keep_one_kind(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
   const auto alike = [&](const std::string& kind) {
-    return std::count_if(robots->begin(), robots->end(),
-                         [&](const RobotFolder& r) { return kind_of(r.robot) == kind; });
+    return std::ranges::count(*robots, kind, [](auto& one) { return kind_of(one.robot); });
   };
   std::string most = kind_of(robots->front().robot);
   for (const RobotFolder& robot : *robots) {

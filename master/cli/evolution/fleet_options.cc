@@ -7,6 +7,7 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
+#include "common/base/ranges.h"
 #include "common/process/process_pool.h"
 #include "common/trials/files.h"
 #include "master/farm/local_workers.h"
@@ -19,12 +20,6 @@ namespace {
 constexpr double kMostMargin_s = 30;
 // Longer than the fleet takes at most to take its jobs away (FleetLoopOptions::drain_limit_s).
 constexpr double kLeaveLimit_s = 90;
-
-std::string whole_path(const std::string& path) {
-  std::error_code code;
-  const auto whole = std::filesystem::absolute(path, code);
-  return code ? path : whole.string();
-}
 
 // Ten letters, which is what SGE shows of a name; the same for the same master and system, so that
 // a fleet that died is taken over by the next.
@@ -214,13 +209,11 @@ Result<std::unique_ptr<OwnedChild>> start_workers_beside(const FleetChoice& choi
     setup.arguments.push_back("--insecure");
   else
     setup.arguments.insert(setup.arguments.end(), {"--keys", keys});
-  const auto fleet = choice.arguments("--on");
-  setup.arguments.insert(setup.arguments.end(), fleet.begin(), fleet.end());
+  append(setup.arguments, choice.arguments("--on"));
   setup.death_signal = SIGTERM;
   setup.leads_group = true;  // Ctrl-C is for the command, which ends this when it is done
-  const Result<pid_t> pid = start_child(setup);
-  if (!pid) return Error{"--workers-on " + choice.system + ": " + pid.error().message};
-  return std::make_unique<OwnedChild>(*pid, kLeaveLimit_s);
+  ASSIGN_OR_RETURN(const pid_t pid, under("--workers-on " + choice.system, start_child(setup)));
+  return std::make_unique<OwnedChild>(pid, kLeaveLimit_s);
 }
 
 }  // namespace gapfarm

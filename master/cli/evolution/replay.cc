@@ -99,10 +99,9 @@ class Replay {
 
   // All scores of `individual`, on the random streams of `birth_id`.
   Result<Standing> standing(const StoredIndividual& individual, std::uint64_t birth_id) {
-    std::vector<v1::Task> tasks;
-    for (unsigned replicate = 0; replicate < std::max(1u, individual.scores); ++replicate) {
-      tasks.push_back(evaluation_task({birth_id, replicate, individual.genome}, seed_));
-    }
+    const auto tasks = mapped(indices(std::max(1u, individual.scores)), [&](std::size_t k) {
+      return evaluation_task({birth_id, static_cast<unsigned>(k), individual.genome}, seed_);
+    });
     ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
     Standing standing;
     for (const v1::TaskResult& result : results) {

@@ -187,7 +187,7 @@ Status change_genes(const BranchOptions& options, const std::string& run, Config
     }
     problem.genes.push_back(gene);
   }
-  std::ranges::sort(problem.genes, [](const Gene& a, const Gene& b) { return a.row < b.row; });
+  std::ranges::sort(problem.genes, {}, &Gene::row);
   return {};
 }
 

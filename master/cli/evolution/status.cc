@@ -4,14 +4,13 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"
@@ -108,11 +107,9 @@ void show_farm(const FarmTally& farm, Screen& screen) {
 }
 
 std::vector<const Incident*> of_kind(const RunStatus& status, IncidentKind kind) {
-  std::vector<const Incident*> all;
-  for (const Incident& incident : status.incidents) {
-    if (incident.kind == kind) all.push_back(&incident);
-  }
-  return all;
+  return filtered(
+      status.incidents, [&](const Incident& one) { return one.kind == kind; },
+      [](const Incident& one) { return &one; });
 }
 
 // The latest of them.
@@ -169,11 +166,11 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
   const RunInfo& info = status.info;
   Screen screen(console, run, "", run_state_name(status.state),
                 running ? progress.waiting : status.stop_reason);
-  screen.line("generation", "{}{}", status.generation,
+  screen.line("generation", "{}{}", status.last.generation,
               running && progress.total > 0
                   ? fmt::format(", and {} of {} tasks of the next", progress.done, progress.total)
                   : "");
-  screen.line("evaluations", "{}{}{}", status.evaluations, rate_text(status.rate_per_s),
+  screen.line("evaluations", "{}{}{}", status.last.evaluations, rate_text(status.rate_per_s),
               !running             ? ", in " + format_duration(status.wall_s)
               : status.time_left_s ? ", " + format_duration(*status.time_left_s) + " left"
                                    : "");
@@ -183,11 +180,11 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
               status.best_individual && status.best_individual->outcome == "INFEASIBLE"
                   ? "; nothing feasible was found yet"
                   : "");
-  if (status.generation > 0) {
+  if (status.last.generation > 0) {
     const unsigned scores = status.best_individual ? status.best_individual->scores : 1;
-    screen.line("", "best {}{}, mean {}, worst {}", format_number(status.best),
+    screen.line("", "best {}{}, mean {}, worst {}", format_number(status.last.best),
                 scores > 1 ? fmt::format(" (of {} noisy scores, the luckiest of all)", scores) : "",
-                format_number(status.mean), format_number(status.worst));
+                format_number(status.last.mean), format_number(status.last.worst));
   }
   show_front(status.front, screen);
   show_best(status, screen);
@@ -198,7 +195,7 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
     screen.line("began at", "{}", printable(start));
   }
   screen.line("seed", "{}", info.seed);
-  if (!status.digest.empty()) screen.line("digest", "{}", status.digest);
+  if (!status.last.digest.empty()) screen.line("digest", "{}", status.last.digest);
   if (status.state == RunState::kStopped)
     screen.line("go on with", "gapfarm resume {}", shell_quoted(run));
   return screen.text();

@@ -4,10 +4,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/config/config.h"
 #include "common/trials/trial.h"
@@ -147,13 +147,9 @@ Result<int> run_crossfit(const CrossfitOptions& options, CliContext& context) {
   plan.hooks = context.work->hooks();
   ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
   ASSIGN_OR_RETURN(const auto groups, crossfit(config.problem, plan, *asked));
-  Json all = Json::array();
-  std::string text;
-  for (const CrossfitGroup& group : groups) {
-    all.push_back(to_json(config.problem, group));
-    text += describe(config.problem, group);
-  }
-  context.console.result(text, all);
+  context.console.result(
+      joined(groups, "", [&](const auto& group) { return describe(config.problem, group); }),
+      mapped(groups, [&](const auto& group) { return to_json(config.problem, group); }));
   return kExitDone;
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/config/config.h"
 #include "common/trials/trial.h"
 #include "master/cli/subcommand.h"
@@ -39,10 +40,9 @@ LikelihoodOf farm_likelihood(Farm& farm, const Problem& problem, std::uint64_t s
   const std::string hash = farm.add_problem(to_proto(problem));
   return [&farm, hash, seed, fitness = problem.fitness](
              const std::vector<Genome>& genomes) -> Result<std::vector<double>> {
-    std::vector<v1::Task> tasks;
-    for (std::size_t i = 0; i < genomes.size(); ++i) {
-      tasks.push_back(evaluation_task({i, 0, genomes[i]}, seed));
-    }
+    const auto tasks = mapped(indices(genomes.size()), [&](std::size_t i) {
+      return evaluation_task({i, 0, genomes[i]}, seed);
+    });
     ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
     std::vector<double> scores;
     for (const v1::TaskResult& result : results) {
@@ -96,10 +96,7 @@ Result<int> run_determine(DetermineCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto config,
                    open_config(command.config, command.trials, context.console, check_evolvable));
   ASSIGN_OR_RETURN(const Problem problem, open_problem(command, config, context.console));
-  Genome point;
-  for (const Gene& gene : problem.genes) {
-    point.push_back(encode_gene(problem.table(), gene, problem.values[gene.row]));
-  }
+  const Genome point = problem.genome_of(problem.values);
   DetermineSettings settings = command.settings;
   settings.seed = config.seed;
   if (context.dry_run) {
@@ -119,10 +116,9 @@ Result<int> run_determine(DetermineCommand& command, CliContext& context) {
     RETURN_IF_ERROR(command.outputs.write(command.out, determine_csv(report, problem.table())));
   }
   context.console.result(determine_text(report, problem.table()), to_json(report, problem.table()));
-  std::string loose;
-  for (const GeneDetermined& g : report.genes) {
-    if (!g.determined) loose += (loose.empty() ? "" : ", ") + problem.table()[g.gene.row].key;
-  }
+  const auto is_loose = [](const GeneDetermined& g) { return !g.determined; };
+  const std::string loose = joined(filtered(report.genes, is_loose), ", ",
+                                   [&](auto& g) { return problem.table()[g.gene.row].key; });
   if (!report.reliable) {
     context.console.note(
         "warning: the likelihood about this model is no hill whose width could be measured; is it "

@@ -31,8 +31,7 @@ Status apply_setting(const std::string& setting, Problem& problem, const std::st
     return Error{option + " " + setting + ": '" + *text + "' is not a number" +
                  (choices.empty() ? "" : suggestion(*text, choices))};
   }
-  if (Status s = table.check(*row, *value); !s)
-    return Error{option + " " + setting + ": " + s.error().message};
+  RETURN_IF_ERROR(under(option + " " + setting, table.check(*row, *value)));
   problem.values[*row] = *value;
   return {};
 }
@@ -58,9 +57,7 @@ Status apply_genes(const std::vector<std::string>& genes, Problem& problem,
       gene.upper = *ends[1];
     }
     for (const double end : {gene.lower, gene.upper}) {
-      if (Status s = table.check(*row, end); !s) {
-        return Error{option + " " + text + ": " + s.error().message};
-      }
+      RETURN_IF_ERROR(under(option + " " + text, table.check(*row, end)));
     }
     const bool twice = contains(problem.genes, *row, &Gene::row);
     if (twice || gene.lower >= gene.upper) {

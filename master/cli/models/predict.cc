@@ -18,7 +18,7 @@
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/report/prediction_table.h"
-#include "master/run/baseline_notes.h"
+#include "master/run/run.h"
 
 namespace gapfarm {
 namespace {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/base/ranges.h"
+
 namespace gapfarm {
 
 namespace {
@@ -212,10 +214,9 @@ Breeder::Breeder(const EvolutionSettings& settings, GeneSpace space)
 }
 
 std::vector<Child::Arm> Breeder::pick_arms(Stream& stream) const {
-  std::vector<Child::Arm> arms;
-  for (std::size_t i = 0; i < roulettes_.size(); ++i) {
-    arms.push_back({i, roulettes_[i].pick(stream)});
-  }
+  auto arms = mapped(indices(roulettes_.size()), [&](std::size_t i) {
+    return Child::Arm{i, roulettes_[i].pick(stream)};
+  });
   if (arms.size() == 2 && arms[0].index == 0 && arms[1].index == 0) {
     // A clone shows nothing: one operator acts after all, crossover or mutation in proportion to
     // how often each does.
@@ -290,17 +291,11 @@ std::vector<NamedNumber> Breeder::probabilities() const {
 }
 
 std::vector<double> Breeder::qualities() const {
-  std::vector<double> all;
-  for (const Roulette& roulette : roulettes_) {
-    all.insert(all.end(), roulette.qualities().begin(), roulette.qualities().end());
-  }
-  return all;
+  return flattened(roulettes_, &Roulette::qualities);
 }
 
 bool Breeder::restore(const std::vector<double>& qualities) {
-  std::size_t arms = 0;
-  for (const Roulette& roulette : roulettes_) arms += roulette.names().size();
-  if (qualities.size() != arms) return false;
+  if (qualities.size() != this->qualities().size()) return false;
   auto next = qualities.begin();
   for (Roulette& roulette : roulettes_) {
     const auto count = static_cast<std::ptrdiff_t>(roulette.names().size());

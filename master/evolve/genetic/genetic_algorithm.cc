@@ -4,6 +4,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "master/evolve/genetic/breeder.h"
 #include "master/evolve/optimisers.h"
 
@@ -174,8 +175,7 @@ std::uint64_t GeneticAlgorithm::next_birth() {
 }
 
 void GeneticAlgorithm::meet(std::span<const std::vector<Individual>> others) {
-  others_.clear();
-  for (const auto& its : others) others_.insert(others_.end(), its.begin(), its.end());
+  others_ = flattened(others, std::identity());
 }
 
 void GeneticAlgorithm::add_random(Plan& plan) {
@@ -191,7 +191,7 @@ void GeneticAlgorithm::add_random(Plan& plan) {
 
 void GeneticAlgorithm::add_children(Plan& plan) {
   std::vector<Individual> pool = std::exchange(others_, {});
-  pool.insert(pool.end(), population_.begin(), population_.end());
+  append(pool, population_);
   sort_best_first(pool);
   const Selection selection(settings_, pool.size());
   while (plan.elites.size() + plan.newborns.size() < settings_.population) {
@@ -201,9 +201,8 @@ void GeneticAlgorithm::add_children(Plan& plan) {
     Child child = breeder_.breed(pool, selection, stream);
     newborn.individual.genome = std::move(child.genome);
     newborn.individual.origin = child.origin;
-    for (std::size_t rank : child.parents) {
-      newborn.individual.parents.push_back(pool[rank].birth_id);
-    }
+    newborn.individual.parents =
+        mapped(child.parents, [&](std::size_t rank) { return pool[rank].birth_id; });
     newborn.arms = std::move(child.arms);
     newborn.parent = pool[*std::ranges::min_element(child.parents)].standing;
     plan.newborns.push_back(std::move(newborn));

@@ -18,14 +18,15 @@ constexpr double kCrossoverIndex = 20, kMutationIndex = 20;
 constexpr double kStep = 0.05;   // of integers, s.d., share of the range
 constexpr unsigned kTries = 20;  // to make a child that is not there yet
 
-Costs costs_of(const Standing& standing) {
+Costs costs_of(const Individual& individual) {
+  const Standing& standing = individual.standing;
   return standing.costs.empty() ? Costs{standing.cost} : standing.costs;
 }
 
 // Constrained domination.
-bool beats(const Standing& a, const Standing& b) {
-  if (a.outcome != v1::OK || b.outcome != v1::OK) return better(a, b);
-  return dominates(costs_of(a), costs_of(b));
+bool beats(const Individual& a, const Individual& b) {
+  const bool both = a.standing.outcome == v1::OK && b.standing.outcome == v1::OK;
+  return both ? dominates(costs_of(a), costs_of(b)) : better_individual(a, b);
 }
 
 // How far a child lies from the middle of its parents, as a share of half their distance;
@@ -189,7 +190,7 @@ void Nsga2::tell(std::span<const Score> scores) {
   const bool first = population_.empty();
   for (const Individual& child : plan.children) {
     for (std::size_t i = 0; i < compared; ++i) {
-      if (beats(child.standing, population_[i].standing)) last_improvement_ = generation_;
+      if (beats(child, population_[i])) last_improvement_ = generation_;
     }
   }
   if (first) last_improvement_ = generation_;
@@ -201,8 +202,7 @@ void Nsga2::tell(std::span<const Score> scores) {
 // The best `size_` by fronts, the last front by crowding.
 void Nsga2::select(std::vector<Individual> all) {
   const std::vector<std::size_t> numbers = front_numbers(
-      all.size(),
-      [&](std::size_t a, std::size_t b) { return beats(all[a].standing, all[b].standing); });
+      all.size(), [&](std::size_t a, std::size_t b) { return beats(all[a], all[b]); });
   std::vector<std::vector<Individual>> fronts(
       numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1);
   for (std::size_t i = 0; i < all.size(); ++i) fronts[numbers[i]].push_back(std::move(all[i]));
@@ -218,13 +218,9 @@ void Nsga2::select(std::vector<Individual> all) {
 }
 
 void Nsga2::take(std::vector<Individual> front) {
-  const auto by_birth = [](const Individual& a, const Individual& b) {
-    return a.birth_id < b.birth_id;
-  };
-  std::ranges::sort(front, by_birth);
+  std::ranges::sort(front, {}, &Individual::birth_id);
   const std::size_t room = size_ - population_.size();
-  std::vector<Costs> costs =
-      mapped(front, [](const Individual& individual) { return costs_of(individual.standing); });
+  std::vector<Costs> costs = mapped(front, costs_of);
   std::vector<double> distances = crowding_distances(costs);
   while (front.size() > room) {
     const auto least = std::ranges::min_element(distances) - distances.begin();
@@ -238,19 +234,12 @@ void Nsga2::take(std::vector<Individual> front) {
 }
 
 std::vector<Costs> Nsga2::front() const {
-  std::vector<Costs> front;
-  for (std::size_t i = 0; i < front_size_; ++i) {
-    front.push_back(costs_of(population_[i].standing));
-  }
-  return front;
+  return mapped(std::span(population_).first(front_size_), costs_of);
 }
 
 std::vector<Costs> Nsga2::costs_of_all() const {
-  std::vector<Costs> ended_well;
-  for (const Individual& member : population_) {
-    if (member.standing.outcome == v1::OK) ended_well.push_back(costs_of(member.standing));
-  }
-  return ended_well;
+  return filtered(
+      population_, [](const Individual& one) { return one.standing.outcome == v1::OK; }, costs_of);
 }
 
 void Nsga2::note_best() {

@@ -6,6 +6,8 @@
 #include <mutex>
 #include <thread>
 
+#include "common/base/ranges.h"
+
 namespace gapfarm {
 namespace {
 
@@ -144,9 +146,7 @@ std::unique_ptr<LocalSearch::Run> LocalSearch::begin_run() const {
                                 ? setup_.settings.local_evaluations
                                 : kEvaluationsPerGene * moving_.size();
   search.set_maxeval(static_cast<int>(limit));
-  std::vector<double> start;
-  for (const std::size_t gene : moving_) start.push_back(start_[gene]);
-  return std::make_unique<Run>(search, std::move(start));
+  return std::make_unique<Run>(search, mapped(moving_, [&](auto gene) { return start_[gene]; }));
 }
 
 std::vector<Genome> LocalSearch::propose(const StreamOf& stream_of) const {
@@ -170,8 +170,7 @@ void LocalSearch::add_cost(const Standing& standing) {
     costs_.push_back(1e30 * (1 + standing.cost / (1 + standing.cost)));
     return;
   }
-  double worst = 0;
-  for (double cost : costs_) worst = std::max(worst, cost);
+  const double worst = max_of(costs_, std::identity());
   costs_.push_back(std::min(2 * worst + 1, 1e60));
 }
 
@@ -216,11 +215,9 @@ std::size_t LocalSearch::improvements(std::size_t span) const {
 // As many as a quadratic model is made of.
 std::vector<Standing> LocalSearch::compared() const {
   const std::size_t last = std::min(costs_.size(), 2 * moving_.size() + 1);
-  std::vector<Standing> standings;
-  for (std::size_t i = costs_.size() - last; i < costs_.size(); ++i) {
-    standings.push_back({v1::OK, costs_[i], 0, 1});
-  }
-  return standings;
+  return mapped(std::span(costs_).last(last), [](double cost) {
+    return Standing{v1::OK, cost, 0, 1};
+  });
 }
 
 std::vector<NamedNumber> LocalSearch::figures() const {

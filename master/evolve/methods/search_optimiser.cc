@@ -5,6 +5,7 @@
 #include <cmath>
 #include <unordered_set>
 
+#include "common/base/ranges.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {
@@ -186,9 +187,7 @@ void SearchOptimiser::tell(std::span<const Score> scores) {
   Plan plan = std::move(*plan_);
   plan_.reset();
   migrant_.clear();
-  std::vector<Standing> standings;
-  for (const Individual& individual : plan.individuals) standings.push_back(individual.standing);
-  method_->learn(plan.proposed, standings);
+  method_->learn(plan.proposed, mapped(plan.individuals, &Individual::standing));
   const double indistinct = 1.5 * noise_variance() / full_scores_;
   if (const Spread spread = spread_of_compared();
       replicates() && spread.count > 1 && spread.variance <= indistinct) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/base/ranges.h"
 #include "common/trials/files.h"
 #include "common/trials/write.h"
 #include "master/experiments/blind_check/cases/seal.h"
@@ -38,14 +39,6 @@ Status make_out(const std::string& out) {
   return {};
 }
 
-Status write_cases(const std::vector<Truth>& cases, const std::vector<TrialLog>& logs,
-                   const CheckPaths& paths) {
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    RETURN_IF_ERROR(write_trials(logs[i], paths.trials(cases[i].id)));
-  }
-  return {};
-}
-
 Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settings,
                           const BlindCheckHooks& hooks, const CheckPaths& paths) {
   RETURN_IF_ERROR(check_fresh(paths));
@@ -58,10 +51,10 @@ Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settin
   if (design.cases.empty()) return Error{"the design holds no case; ask for effects or nulls"};
   hooks.stages.began(1);
   ASSIGN_OR_RETURN(const auto logs, simulate_cases(config, design.cases, settings.plan, 0, *farm));
-  RETURN_IF_ERROR(write_cases(design.cases, logs, paths));
-
   InHand hand{{}, design.out_of_reach};
-  for (const Truth& truth : design.cases) {
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    const Truth& truth = design.cases[i];
+    RETURN_IF_ERROR(write_trials(logs[i], paths.trials(truth.id)));
     hand.sealed.push_back({truth.id, random_salt(), format_truth(truth)});
   }
   RETURN_IF_ERROR(write_file_atomically(paths.seals(), format_seals(hand.sealed)));
@@ -149,10 +142,9 @@ Status write_report(const BlindReport& report, const CheckPaths& paths) {
 Status diagnose_blindly(const InHand& hand, const std::vector<Truth>& truths,
                         const BlindCheckSettings& settings, const BlindCheckHooks& hooks,
                         const CheckPaths& paths) {
-  std::vector<OpenCase> open;
-  for (const Truth& truth : truths) {
-    open.push_back({truth.id, paths.trials(truth.id), truth.excluded});
-  }
+  const auto open = mapped(truths, [&](const Truth& truth) {
+    return OpenCase{truth.id, paths.trials(truth.id), truth.excluded};
+  });
   const PrivateMemory unreadable;
   Status diagnosed = diagnose_cases(open, paths, settings.diagnose, hooks);
   if (diagnosed) return {};

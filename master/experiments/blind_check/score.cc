@@ -65,13 +65,10 @@ Judgement judge_effects(const Truth& truth, const Diagnosis& diagnosis) {
 
 // Strengths all neutral: places and directions mean nothing.
 bool does_nothing(const Effect& entry, const TrueEffect& effect) {
-  for (std::size_t i = 0; i < entry.strengths; ++i) {
-    const auto found = effect.parameters.find(entry.parameters[i].key);
-    if (found != effect.parameters.end() && found->second != entry.parameters[i].nominal) {
-      return false;
-    }
-  }
-  return true;
+  return std::ranges::all_of(std::span(entry.parameters).first(entry.strengths), [&](auto& p) {
+    const double* stated = find_in(effect.parameters, p.key);
+    return !stated || *stated == p.nominal;
+  });
 }
 
 // `turn`: after which the value means the same; 0: never.
@@ -91,12 +88,10 @@ bool has_no_arrow(const std::string& effect) {
 std::map<std::string, double> as_reported(const TrueEffect& effect) {
   std::map<std::string, double> stated = effect.parameters;
   if (!has_no_arrow(effect.name) || !stated.count("direction")) return stated;
-  const auto ratio = stated.find("ratio"), stretch = stated.find("stretch");
-  const bool across = (ratio != stated.end() && ratio->second < 1) ||
-                      (stretch != stated.end() && stretch->second < 0);
-  if (!across) return stated;
-  if (ratio != stated.end()) ratio->second = 1 / ratio->second;
-  if (stretch != stated.end()) stretch->second = -stretch->second;
+  double *ratio = find_in(stated, "ratio"), *stretch = find_in(stated, "stretch");
+  if (!(ratio && *ratio < 1) && !(stretch && *stretch < 0)) return stated;
+  if (ratio) *ratio = 1 / *ratio;
+  if (stretch) *stretch = -*stretch;
   stated["direction"] += std::numbers::pi / 2;
   return stated;
 }
@@ -114,35 +109,28 @@ std::optional<bool> missed_below(const Truth& truth, const Diagnosis& diagnosis)
     if (named || !entry || !screened || truth.kind == CaseKind::kOutside) continue;
     for (std::size_t i = 0; i < entry->strengths; ++i) {
       const Parameter& p = entry->parameters[i];
-      const auto value = effect.parameters.find(p.key);
+      const double* value = find_in(effect.parameters, p.key);
       const auto* from = find_by(screened->detectable_from, p.key, [](auto& f) { return f.first; });
-      if (value == effect.parameters.end() || !from || !std::isfinite(from->second)) continue;
-      below = below.value_or(true) && std::abs(value->second - p.nominal) < from->second;
+      if (!value || !from || !std::isfinite(from->second)) continue;
+      below = below.value_or(true) && std::abs(*value - p.nominal) < from->second;
     }
   }
   return below;
 }
 
 Judgement judge(const Truth& truth, const Diagnosis& diagnosis) {
+  const Verdict verdict = diagnosis.verdict;
+  const bool names_none = diagnosis.effects.empty();
   for (const NamedEffect& effect : diagnosis.effects) {
-    if (effect.aliases.size() > kMaxAliases) {
-      return {false, "more than " + std::to_string(kMaxAliases) + " aliases say nothing"};
-    }
+    if (effect.aliases.size() <= kMaxAliases) continue;
+    return {false, "more than " + std::to_string(kMaxAliases) + " aliases say nothing"};
   }
-  switch (truth.kind) {
-    case CaseKind::kNull:
-      return {diagnosis.verdict == Verdict::kNone && diagnosis.effects.empty(),
-              "null; reported " + names_of(diagnosis)};
-    case CaseKind::kOutside:
-      return {(diagnosis.verdict == Verdict::kUnknown ||
-               diagnosis.verdict == Verdict::kEffectAndUnknown) &&
-                  diagnosis.effects.empty(),
-              "outside the catalogue; reported " + names_of(diagnosis)};
-    case CaseKind::kSingle:
-    case CaseKind::kPair:
-      break;
+  if (truth.kind == CaseKind::kNull) {
+    return {verdict == Verdict::kNone && names_none, "null; reported " + names_of(diagnosis)};
   }
-  return judge_effects(truth, diagnosis);
+  if (truth.kind != CaseKind::kOutside) return judge_effects(truth, diagnosis);
+  const bool unknown = verdict == Verdict::kUnknown || verdict == Verdict::kEffectAndUnknown;
+  return {unknown && names_none, "outside the catalogue; reported " + names_of(diagnosis)};
 }
 
 std::string first_reported(const Diagnosis& diagnosis) {
@@ -160,10 +148,9 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Diagnosis& diagnosis
     const std::map<std::string, double> stated = as_reported(effect);
     for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
       const Parameter& p = entry->parameters[i];
-      const auto value = stated.find(p.key);
-      if (value == stated.end() || !p.choices.empty()) continue;
-      if (neutral && i >= entry->strengths) continue;
-      Coverage coverage{effect.name, p.key, value->second, kAbsent, kAbsent, false};
+      const double* value = find_in(stated, p.key);
+      if (!value || !p.choices.empty() || (neutral && i >= entry->strengths)) continue;
+      Coverage coverage{effect.name, p.key, *value, kAbsent, kAbsent, false};
       coverage.is_strength = i < entry->strengths;
       for (const Estimate& s : named->parameters) {
         if (s.key != p.key || !std::isfinite(s.lo) || !std::isfinite(s.hi)) continue;
@@ -171,10 +158,10 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Diagnosis& diagnosis
         coverage.hi = s.hi;
         // A direction's bounds are a whole turn of it apart.
         const double turn = p.key == "direction" ? p.upper - p.lower : 0;
-        coverage.covered = holds(s.lo, s.hi, value->second, turn);
+        coverage.covered = holds(s.lo, s.hi, *value, turn);
         if (!s.sd || !(*s.sd > 0)) continue;
         const double half = kNormal90 * *s.sd;
-        coverage.covered_by_fit = holds(s.value - half, s.value + half, value->second, turn);
+        coverage.covered_by_fit = holds(s.value - half, s.value + half, *value, turn);
         if (s.bound && *s.bound > 0) coverage.fit_over_bound = *s.sd / *s.bound;
       }
       all.push_back(coverage);
@@ -184,9 +171,7 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Diagnosis& diagnosis
 }
 
 double promised_shrinkage(const Diagnosis& diagnosis) {
-  double sum = 0;
-  for (const NamedEffect& effect : diagnosis.effects) sum += effect.closed;
-  return sum;
+  return sum_of(diagnosis.effects, &NamedEffect::closed);
 }
 
 }  // namespace gapfarm

@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -34,24 +32,28 @@ std::vector<RateRow> rate_rows(const Tally& sum) {
     rows.push_back(
         {"singles_first", "single " + level + " effects: the true name first", "", rate, level});
   }
-  const std::vector<RateRow> others = {
-      {"null_none", "nulls called none", ">= 95 %", sum.null_none},
-      {"false_alarms", "nulls with an effect named (false alarms)", "", sum.false_alarms},
-      {"outside_unknown", "effects outside the catalogue called unknown", ">= 85 %",
-       sum.outside_unknown},
-      {"outside_closed", "... of these, model.toml closes half of the truth's", ">= 79 %",
-       sum.outside_closed},
-      {"pairs_right", "pairs right", ">= 80 %", sum.pairs_right},
-      {"missed_below", "missed effects that lie below what their log shows", "", sum.missed_below},
-      {"covered", "parameters within their 90 % interval", "85 to 95 %", sum.covered},
-      {"strengths_covered", "... of these, strengths", "", sum.strengths_covered},
-      {"places_covered", "... of these, places, directions and the like", "", sum.places_covered},
-      {"fits_covered", "... by the interval of the fit alone", "88 to 92 %", sum.fits_covered},
-      {"fits_at_bound", "intervals of fits 0.9 to 1.3 times as wide as the bound", ">= 90 %",
-       sum.fits_at_bound},
-      {"promise_kept", "promised shrinkage within 0.1 of realised", ">= 90 %", sum.promise_kept},
-      {"failed", "diagnoses that failed", "0", sum.failed}};
-  rows.insert(rows.end(), others.begin(), others.end());
+  append(
+      rows,
+      std::vector<RateRow>{
+          {"null_none", "nulls called none", ">= 95 %", sum.null_none},
+          {"false_alarms", "nulls with an effect named (false alarms)", "", sum.false_alarms},
+          {"outside_unknown", "effects outside the catalogue called unknown", ">= 85 %",
+           sum.outside_unknown},
+          {"outside_closed", "... of these, model.toml closes half of the truth's", ">= 79 %",
+           sum.outside_closed},
+          {"pairs_right", "pairs right", ">= 80 %", sum.pairs_right},
+          {"missed_below", "missed effects that lie below what their log shows", "",
+           sum.missed_below},
+          {"covered", "parameters within their 90 % interval", "85 to 95 %", sum.covered},
+          {"strengths_covered", "... of these, strengths", "", sum.strengths_covered},
+          {"places_covered", "... of these, places, directions and the like", "",
+           sum.places_covered},
+          {"fits_covered", "... by the interval of the fit alone", "88 to 92 %", sum.fits_covered},
+          {"fits_at_bound", "intervals of fits 0.9 to 1.3 times as wide as the bound", ">= 90 %",
+           sum.fits_at_bound},
+          {"promise_kept", "promised shrinkage within 0.1 of realised", ">= 90 %",
+           sum.promise_kept},
+          {"failed", "diagnoses that failed", "0", sum.failed}});
   return rows;
 }
 
@@ -125,23 +127,18 @@ Json case_json(const ScoredCase& c) {
 }
 
 std::string row_of_cells(const std::vector<std::string>& cells) {
-  std::string row = "|";
-  for (const std::string& cell : cells) row += " " + cell + " |";
-  return row + "\n";
+  return "| " + joined(cells, " | ") + " |\n";
 }
 
 std::string table_head(const std::vector<std::string>& cells) {
-  std::string rule = "|";
-  for (std::size_t i = 0; i < cells.size(); ++i) rule += " --- |";
-  return row_of_cells(cells) + rule + "\n";
+  return row_of_cells(cells) + row_of_cells(std::vector<std::string>(cells.size(), "---"));
 }
 
 std::string rates_markdown(const Tally& sum) {
-  std::string text = table_head({"what", "wanted", "found [95 % interval]", "cases"});
-  for (const RateRow& row : rate_rows(sum)) {
-    text += row_of_cells({row.label, row.wanted, percent(row.rate), counts(row.rate)});
-  }
-  return text;
+  return table_head({"what", "wanted", "found [95 % interval]", "cases"}) +
+         joined(rate_rows(sum), "", [](const RateRow& row) {
+           return row_of_cells({row.label, row.wanted, percent(row.rate), counts(row.rate)});
+         });
 }
 
 std::string effects_markdown(const Tally& sum) {
@@ -156,8 +153,8 @@ std::string effects_markdown(const Tally& sum) {
   for (const auto& [effect, rates] : sum.by_effect) {
     std::vector<std::string> cells = {effect};
     for (const std::string& level : levels) {
-      const auto found = rates.find(level);
-      cells.push_back(found == rates.end() ? "-" : counts(found->second));
+      const Rate* rate = find_in(rates, level);
+      cells.push_back(rate ? counts(*rate) : "-");
     }
     Rate covered;
     for (const auto& [key, rate] : sum.covered_by_parameter) {
@@ -177,13 +174,13 @@ std::string confusion_markdown(const Tally& sum) {
     for (const auto& [name, count] : row) reported.insert(name);
   }
   std::vector<std::string> head = {"truth \\ reported first"};
-  head.insert(head.end(), reported.begin(), reported.end());
+  append(head, reported);
   std::string text = table_head(head);
   for (const auto& [truth, row] : sum.confusion) {
     std::vector<std::string> cells = {truth};
     for (const std::string& name : reported) {
-      const auto found = row.find(name);
-      cells.push_back(found == row.end() ? "" : std::to_string(found->second));
+      const unsigned* count = find_in(row, name);
+      cells.push_back(count ? std::to_string(*count) : "");
     }
     text += row_of_cells(cells);
   }

@@ -26,17 +26,8 @@ std::optional<double> gap_of(const FreshScores& scores) {
 }
 
 std::string truth_family(const Truth& truth) {
-  switch (truth.kind) {
-    case CaseKind::kNull:
-      return "none";
-    case CaseKind::kOutside:
-      return "outside";
-    case CaseKind::kPair:
-      return "pair";
-    case CaseKind::kSingle:
-      break;
-  }
-  return truth.effects.front().name;
+  if (truth.kind == CaseKind::kSingle) return truth.effects.front().name;
+  return truth.kind == CaseKind::kNull ? "none" : case_kind_name(truth.kind);
 }
 
 void add_kind(const ScoredCase& c, Tally& sum) {

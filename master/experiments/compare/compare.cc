@@ -20,10 +20,10 @@ class Lane {
     settings.evaluations = settings.generations = evaluations;
     const OptimiserSetup setup = optimiser_setup(settings, variant.config.problem, seed);
     ASSIGN_OR_RETURN(const auto plan, read_stages(variant.config));
-    auto optimiser = plan.stages.empty() ? make_optimiser(setup) : make_staged(setup, plan.stages);
-    if (!optimiser) return Error{"variant \"" + variant.name + "\": " + optimiser.error().message};
     Lane lane;
-    lane.optimiser_ = *std::move(optimiser);
+    ASSIGN_OR_RETURN(lane.optimiser_, under("variant \"" + variant.name + "\"",
+                                            plan.stages.empty() ? make_optimiser(setup)
+                                                                : make_staged(setup, plan.stages)));
     lane.kind_ = variant.config.problem.fitness.kind;
     lane.noisy_ = setup.noisy;
     lane.limit_ = evaluations;
@@ -131,12 +131,10 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
 }
 
 CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
-  std::vector<std::string> hashes;
-  std::vector<FitnessSettings> fitness;
-  for (const Variant& variant : variants) {
-    hashes.push_back(farm.add_problem(to_proto(variant.config.problem)));
-    fitness.push_back(variant.config.problem.fitness);
-  }
+  const auto hashes = mapped(variants, [&](const Variant& variant) {
+    return farm.add_problem(to_proto(variant.config.problem));
+  });
+  const auto fitness = mapped(variants, [](auto& v) { return v.config.problem.fitness; });
   return [&farm, hashes,
           fitness](std::span<const CompareRequest> requests) -> Result<std::vector<Score>> {
     std::map<std::string, std::vector<std::size_t>> by_problem;

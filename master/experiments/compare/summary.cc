@@ -32,9 +32,8 @@ std::vector<std::uint64_t> grid_of(std::uint64_t last) {
 }
 
 double cost_after(const ComparedRun& run, std::uint64_t evaluations, bool higher_is_better) {
-  const auto after = std::upper_bound(
-      run.improvements.begin(), run.improvements.end(), evaluations,
-      [](std::uint64_t e, const Improvement& improvement) { return e < improvement.evaluations; });
+  const auto after =
+      std::ranges::upper_bound(run.improvements, evaluations, {}, &Improvement::evaluations);
   if (after == run.improvements.begin()) return kNothing;
   const double fitness = std::prev(after)->fitness;
   return higher_is_better ? -fitness : fitness;

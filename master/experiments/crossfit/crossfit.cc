@@ -145,7 +145,7 @@ class Crossfit {
             " trials were tuned on and say nothing of others; name what to tune "
             "on with --train");
       }
-      tests.trials.insert(tests.trials.end(), test.trials.begin(), test.trials.end());
+      append(tests.trials, test.trials);
     }
     for (const std::string& key : plan_.sweeps) {
       ASSIGN_OR_RETURN(auto swept, sweep(key, train, tests, group.tuned.values));
@@ -182,13 +182,12 @@ class Crossfit {
     if (!plan_.per.empty()) {
       ASSIGN_OR_RETURN(per, trial_column_reader(log, plan_.per));
       const auto values = values_in(log, per);
-      if (values.size() > 1) parts.insert(parts.end(), values.begin(), values.end());
+      if (values.size() > 1) append(parts, values);
     }
     for (const std::string& part : parts) {
-      std::vector<std::size_t> members;
-      for (std::size_t i = 0; i < log.trials.size(); ++i) {
-        if (part.empty() || per(log.trials[i]) == part) members.push_back(i);
-      }
+      const auto members = filtered(indices(log.trials.size()), [&](std::size_t i) {
+        return part.empty() || per(log.trials[i]) == part;
+      });
       const auto errors = [&](const std::vector<Pose>& all) {
         std::vector<Trial> trials;
         std::vector<Pose> chosen;
@@ -210,10 +209,9 @@ class Crossfit {
     const ParameterTable& table = problem_.table();
     const auto row = table.find(key);  // check() found it
     // Over the gene's range where it is one, else over the row's.
-    Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
-    for (const Gene& searched : problem_.genes) {
-      if (searched.row == *row) gene = searched;
-    }
+    const Gene whole{*row, table[*row].lower, table[*row].upper, table[*row].scale};
+    const Gene* searched = find_by(problem_.genes, *row, &Gene::row);
+    const Gene gene = searched ? *searched : whole;
     Sweep sweep{key, {}};
     std::vector<ParameterValues> points;
     for (unsigned i = 0; i < plan_.sweep_points; ++i) {
@@ -272,7 +270,7 @@ ScoreCandidates scores_by(Farm& farm, const Problem& problem, std::uint64_t seed
 }  // namespace
 
 Status check_crossfit(const Problem& problem, const CrossfitPlan& plan) {
-  if (const auto parts = parts_of(problem, plan); !parts) return parts.error();
+  RETURN_IF_ERROR(parts_of(problem, plan));
   return {};
 }
 
@@ -293,9 +291,7 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
 
 Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings) {
   OptimiserSetup setup = optimiser_setup(settings.evolution, problem, settings.seed);
-  setup.nominal = mapped(problem.genes, [&](const Gene& gene) {
-    return encode_gene(problem.table(), gene, problem.values[gene.row]);
-  });
+  setup.nominal = problem.genome_of(problem.values);
   ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
   EvolveOptions options;
   options.settings = settings.evolution;

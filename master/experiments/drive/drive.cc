@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/ranges.h"
 #include "common/random/stream.h"
 #include "master/farm/planned_trials.h"
 
@@ -284,10 +283,9 @@ Mover constant_velocity_mover(std::vector<ConstantVelocity> models, const DriveS
 }
 
 Mover mined_mover(const MotionModel& model, const DriveSettings& settings) {
-  std::vector<CommandMotion> motions;
-  for (const CommandMotion& motion : model.commands()) {
-    if (motion.trials >= MotionModelSettings{}.least_trials) motions.push_back(motion);
-  }
+  const auto motions = filtered(model.commands(), [](const CommandMotion& motion) {
+    return motion.trials >= MotionModelSettings{}.least_trials;
+  });
   return [motions, settings](std::span<const MoverStart> starts) -> Result<std::vector<Leg>> {
     std::vector<Leg> legs;
     for (const MoverStart& start : starts) {

@@ -38,9 +38,9 @@ LineChart floor_chart(const DriveReport& report) {
   }
   if (!report.targets.empty()) {
     ChartSeries targets{.name = "way-points"};
-    for (const Eigen::Vector2d& t : report.targets) {
-      targets.marks.push_back({t.x(), t.y(), std::nan("")});
-    }
+    targets.marks = mapped(report.targets, [](auto& t) {
+      return Pose{t.x(), t.y(), std::nan("")};
+    });
     chart.series.push_back(std::move(targets));
   }
   const DriverReport& first = report.drivers.front();
@@ -83,8 +83,7 @@ constexpr double kThinnest = 1e-6;
 constexpr unsigned kPointsALeg = 20;
 
 Pose pose_at(const std::vector<PathSample>& path, double t_s) {
-  const auto after = std::lower_bound(path.begin(), path.end(), t_s,
-                                      [](const PathSample& s, double t) { return s.t_s < t; });
+  const auto after = std::ranges::lower_bound(path, t_s, {}, &PathSample::t_s);
   if (after == path.begin()) return path.front().pose;
   if (after == path.end()) return path.back().pose;
   const PathSample& a = *std::prev(after);
@@ -112,17 +111,12 @@ double excursion_of(const std::vector<BandPoint>& band, const std::vector<GridPo
 }
 
 BandPoint shape_at(const std::vector<std::vector<GridPoint>>& paths, std::size_t i) {
-  std::vector<double> x, y, heading;
-  for (const auto& path : paths) {
-    x.push_back(path[i].pose.x);
-    y.push_back(path[i].pose.y);
-    heading.push_back(path[i].pose.theta);
-  }
-  BandPoint point{
-      paths[0][i].leg, paths[0][i].share, {median(x), median(y), circular_centre(heading)}, {}, {}};
+  const auto poses = mapped(paths, [&](const auto& path) { return path[i].pose; });
+  const Pose middle{median(mapped(poses, &Pose::x)), median(mapped(poses, &Pose::y)),
+                    circular_centre(mapped(poses, &Pose::theta))};
+  BandPoint point{paths[0][i].leg, paths[0][i].share, middle, {}, {}};
   for (int k = 0; k < 3; ++k) {
-    std::vector<double> deviations;
-    for (const auto& path : paths) deviations.push_back(off(point.middle, path[i].pose)[k]);
+    const auto deviations = mapped(poses, [&](const Pose& X) { return off(middle, X)[k]; });
     point.below[k] = std::max(kThinnest, -quantile(deviations, 0.05));
     point.above[k] = std::max(kThinnest, quantile(deviations, 0.95));
   }
@@ -255,12 +249,8 @@ std::vector<BandPoint> path_band(std::span<const DrivenRun> runs, double coverag
   for (std::size_t r = 0; r < runs.size(); ++r) {
     (r % 2 == 0 ? shaping : judging).push_back(on_grid(runs[r], kPointsALeg));
   }
-  std::vector<BandPoint> band;
-  for (std::size_t i = 0; i < shaping.front().size(); ++i) {
-    band.push_back(shape_at(shaping, i));
-  }
-  std::vector<double> excursions;
-  for (const auto& path : judging) excursions.push_back(excursion_of(band, path));
+  auto band = mapped(indices(shaping.front().size()), [&](auto i) { return shape_at(shaping, i); });
+  auto excursions = mapped(judging, [&](const auto& path) { return excursion_of(band, path); });
   std::ranges::sort(excursions);
   const auto n = static_cast<double>(excursions.size());
   const double rank = std::clamp(std::ceil((n + 1) * coverage), 1.0, n);
@@ -317,9 +307,7 @@ std::vector<PathPoint> floor_path(std::span<const PathSample> path, double spaci
 }
 
 std::vector<PathPoint> floor_path(const DrivenRun& run, double spacing_m) {
-  std::vector<PathSample> whole;
-  for (const Leg& leg : run) whole.insert(whole.end(), leg.path.begin(), leg.path.end());
-  return floor_path(whole, spacing_m);
+  return floor_path(flattened(run, &Leg::path), spacing_m);
 }
 
 }  // namespace gapfarm

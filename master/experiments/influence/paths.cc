@@ -55,11 +55,9 @@ std::span<const PathPoint> first(const std::vector<PathPoint>& path, std::size_t
 
 std::vector<v1::Override> overrides_of(const ParameterTable& table, const std::vector<Gene>& genes,
                                        const Genome& genome) {
-  std::vector<v1::Override> overrides;
-  for (std::size_t i = 0; i < genome.size(); ++i) {
-    overrides.push_back(override_of(genes[i].row, decode_gene(table, genes[i], genome[i])));
-  }
-  return overrides;
+  return mapped(indices(genome.size()), [&](std::size_t i) {
+    return override_of(genes[i].row, decode_gene(table, genes[i], genome[i]));
+  });
 }
 
 std::size_t traces_of_a_set(const Problem& problem, const TraceSettings& settings) {
@@ -99,10 +97,9 @@ Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
 
 double set_distance(const PathSet& a, const PathSet& b, PathDistance distance,
                     std::size_t samples) {
-  double sum = 0;
-  for (std::size_t c = 0; c < a.paths.size(); ++c) {
-    sum += distance(first(a.paths[c], samples), first(b.paths[c], samples));
-  }
+  const double sum = sum_of(indices(a.paths.size()), [&](std::size_t c) {
+    return distance(first(a.paths[c], samples), first(b.paths[c], samples));
+  });
   return sum / static_cast<double>(a.paths.size());
 }
 
@@ -136,11 +133,9 @@ Result<std::vector<std::optional<double>>> spreads_at(Farm& farm, const Problem&
     }
   }
   ASSIGN_OR_RETURN(const auto sets, trace_paths(farm, problem, settings.trace, requests));
-  std::vector<std::optional<double>> found;
-  for (std::size_t i = 0; i < genomes.size(); ++i) {
-    found.push_back(end_spread(std::span(sets).subspan(i * settings.repeats, settings.repeats)));
-  }
-  return found;
+  return mapped(indices(genomes.size()), [&](std::size_t i) {
+    return end_spread(std::span(sets).subspan(i * settings.repeats, settings.repeats));
+  });
 }
 
 std::vector<Score> scores_of(const std::vector<std::optional<double>>& spreads) {

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdio>
 #include <numbers>
 
 #include "common/base/constants.h"
@@ -23,11 +22,9 @@ constexpr double kStraight = 0.2;  // turn over way, of what counts as straight
 constexpr double kGentle = 0.9;    // and of arcs that end before they have turned round
 
 std::vector<DriveSample> with_turns_below(const std::vector<DriveSample>& samples, double most) {
-  std::vector<DriveSample> kept;
-  for (const DriveSample& s : samples) {
-    if (s.forward_s != 0 && std::abs(s.turn_s) <= most * std::abs(s.forward_s)) kept.push_back(s);
-  }
-  return kept;
+  return filtered(samples, [&](const DriveSample& s) {
+    return s.forward_s != 0 && std::abs(s.turn_s) <= most * std::abs(s.forward_s);
+  });
 }
 
 constexpr double kPi = std::numbers::pi;
@@ -42,11 +39,7 @@ constexpr double kLeastShare = 0.3;  // of the typical distance: shorter ones ha
 constexpr double kMostOffset_rad = 0.5;
 constexpr double kNearAxis_rad = 0.4;
 
-std::string degrees(double angle_rad) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f", angle_rad * 180 / kPi);
-  return std::string(text) + " degrees";
-}
+std::string degrees(double angle_rad) { return formatted("%.0f degrees", angle_rad * 180 / kPi); }
 
 std::string share(double value) { return formatted("%.2f", value); }
 
@@ -56,9 +49,8 @@ bool near(double angle_rad, double axis_rad) {
 
 // Mean cosine of how far the turns are from `rate` times the command.
 double agreement(const std::vector<DriveSample>& turns, double rate) {
-  double sum = 0;
-  for (const DriveSample& s : turns) sum += std::cos(s.turned_rad() - rate * s.turn_s);
-  return sum / static_cast<double>(turns.size());
+  return mean(mapped(
+      turns, [&](const DriveSample& s) { return std::cos(s.turned_rad() - rate * s.turn_s); }));
 }
 
 struct Rate {
@@ -68,8 +60,7 @@ struct Rate {
 
 // The best rate of one sign, in rad a second at full duty on one side more than on the other.
 Rate best_rate(const std::vector<DriveSample>& turns, double sign) {
-  std::vector<double> sizes;
-  for (const DriveSample& s : turns) sizes.push_back(std::abs(s.turn_s));
+  const auto sizes = mapped(turns, [](const DriveSample& s) { return std::abs(s.turn_s); });
   const double largest = *std::ranges::max_element(sizes);
   const double fastest = 2 * kPi / median(sizes);
   const double step = 0.05 / largest;
@@ -85,10 +76,8 @@ Rate best_rate(const std::vector<DriveSample>& turns, double sign) {
 // as it should be, -1 clockwise; 0 where the log does not say, so also where turns by 200 degrees
 // one way cannot be distinguished from 160 the other.
 int sense_of_turns(const std::vector<DriveSample>& samples) {
-  std::vector<DriveSample> turns;
-  for (const DriveSample& s : samples) {
-    if (std::abs(s.turn_s) > 1e-9) turns.push_back(s);
-  }
+  const auto turns =
+      filtered(samples, [](const DriveSample& s) { return std::abs(s.turn_s) > 1e-9; });
   if (turns.size() < kFewestTurns) return 0;
   const Rate ccw = best_rate(turns, 1), cw = best_rate(turns, -1);
   // It must explain most of what no turning at all leaves; where turns are small that is little.
@@ -326,12 +315,11 @@ void check_turning(const std::vector<DriveSample>& samples, const DriveLimits& l
   const double speed = full_speed_of(samples);
   if (straight_samples(samples).size() < kFewestStraight || limits.gauge_m <= 0) return;
   // Slow turns, so that none has gone round.
-  std::vector<double> rates;
-  for (const DriveSample& s : samples) {
-    if (std::abs(s.turn_s) > 1e-9 && std::abs(s.turn_s) * speed / limits.gauge_m < 2) {
-      rates.push_back(s.turned_rad() / s.turn_s);
-    }
-  }
+  const auto turns_slowly = [&](const DriveSample& s) {
+    return std::abs(s.turn_s) > 1e-9 && std::abs(s.turn_s) * speed / limits.gauge_m < 2;
+  };
+  const auto rates = filtered(samples, turns_slowly,
+                              [](const DriveSample& s) { return s.turned_rad() / s.turn_s; });
   if (rates.size() < kFewestStraight) return;
   const double rate = median(rates), fastest = speed / limits.gauge_m;
   if (rate < kUnslipped * fastest) return;
@@ -378,10 +366,9 @@ std::vector<DriveSample> straight_samples(const std::vector<DriveSample>& sample
 }
 
 double full_speed_of(const std::vector<DriveSample>& samples) {
-  std::vector<double> speeds;
-  for (const DriveSample& s : straight_samples(samples)) {
-    speeds.push_back(s.distance_m() / std::abs(s.forward_s));
-  }
+  const auto speeds = mapped(straight_samples(samples), [](const DriveSample& s) {
+    return s.distance_m() / std::abs(s.forward_s);
+  });
   return speeds.empty() ? 0 : median(speeds);
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
@@ -55,12 +56,8 @@ struct Cell {
 // Their reach is their spread as yet.
 std::optional<Cell> cell_of(const std::vector<Pose>& ends) {
   if (ends.size() < kFewestRepeats) return std::nullopt;
-  std::vector<double> x, y, theta;
-  for (const Pose& E : ends) {
-    x.push_back(E.x);
-    y.push_back(E.y);
-    theta.push_back(E.theta);
-  }
+  const auto x = mapped(ends, &Pose::x), y = mapped(ends, &Pose::y);
+  std::vector<double> theta = mapped(ends, &Pose::theta);
   Cell cell{{median(x), median(y), circular_centre(theta)}};
   for (double& t : theta) t = wrap_angle(t - cell.end.theta);
   cell.reach_m = std::max(median_deviation(x, cell.end.x), median_deviation(y, cell.end.y));
@@ -95,10 +92,9 @@ using Cells = std::map<Command, std::optional<Cell>>;
 // Of few drives a false one or two make the spread.
 void reach_beyond_noise(const MoveTolerance& unsure, Cells* cells) {
   const auto reach = [&](double Cell::*of, double least) {
-    std::vector<double> all;
-    for (const auto& [command, cell] : *cells) {
-      if (cell) all.push_back((*cell).*of);
-    }
+    const auto all = filtered(
+        *cells, [](auto& one) { return one.second.has_value(); },
+        [&](auto& one) { return (*one.second).*of; });
     if (all.empty()) return;
     const double most = kMostSpread * median(all);
     for (auto& [command, cell] : *cells) {

@@ -39,8 +39,7 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"impossible_rows", "some rows cannot be"},
       {"false_readings", "some readings are false"},
       {"tip_jumps", "the finger jumps"}};
-  const auto found = phrases.find(finding.name);
-  if (found != phrases.end()) return found->second;
+  if (const std::string* phrase = find_in(phrases, finding.name)) return *phrase;
   std::string words = finding.name;
   std::replace(words.begin(), words.end(), '_', ' ');
   return words;

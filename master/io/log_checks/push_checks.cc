@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/parameters/table.h"
 #include "master/io/log_checks/log_checks.h"
@@ -15,12 +16,8 @@ constexpr double kStill_m = 0.0005, kStill_rad = 0.005;
 constexpr double kFar = 2;  // of the farthest corner: no finger that touches is so far away
 
 double reach_of(const Piece& piece) {
-  double reach = 0;
   const Eigen::Vector2d middle = centroid(piece);
-  for (const Eigen::Vector2d& corner : piece.corners) {
-    reach = std::max(reach, (corner - middle).norm());
-  }
-  return reach;
+  return max_of(piece.corners, [&](const auto& corner) { return (corner - middle).norm(); });
 }
 
 // Finger and outlines miss or overlap one another by this share of a piece's reach, mean over

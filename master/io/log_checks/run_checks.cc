@@ -228,11 +228,11 @@ std::vector<std::size_t> lost_poses(const LoggedRun& run, std::size_t start, int
     if (!is_back && lost.size() <= most) continue;
     // Back without a jump it had only gone on.
     const bool was_lost = is_back && !lost.empty() && !leads(lost.back(), time);
-    if (was_lost) all.insert(all.end(), lost.begin(), lost.end());
+    if (was_lost) append(all, lost);
     lost.clear();
     last = i;
   }
-  all.insert(all.end(), lost.begin(), lost.end());
+  append(all, lost);
   return all;
 }
 

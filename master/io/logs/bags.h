@@ -2,6 +2,7 @@
 // say what they left.  Errors: "FILE:BYTE: found ..., expected ...; remedy"; nothing is half-read.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -34,11 +35,9 @@ struct LogTable {
     return values[row * columns.size() + column];
   }
   std::optional<std::size_t> find(std::string_view name) const {
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      if (columns[i] == name) return i;
-    }
-    for (std::size_t i = 0; i < titles.size(); ++i) {
-      if (titles[i] == name) return i;
+    for (const auto* names : {&columns, &titles}) {
+      const auto found = std::ranges::find(*names, name);
+      if (found != names->end()) return static_cast<std::size_t>(found - names->begin());
     }
     return {};
   }

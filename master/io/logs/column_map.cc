@@ -61,11 +61,8 @@ std::optional<UnitKind> kind_of(std::string_view table, const MappedColumn& c) {
 }
 
 std::string units_of(UnitKind kind) {
-  std::string names;
-  for (const Unit& unit : kUnits) {
-    if (unit.kind == kind) names += (names.empty() ? "" : ", ") + std::string(unit.name);
-  }
-  return names;
+  return joined(filtered(kUnits, [&](const Unit& unit) { return unit.kind == kind; }), ", ",
+                &Unit::name);
 }
 
 struct ColumnNumber {
@@ -144,9 +141,7 @@ class MapReader {
     }
     // TOML's tables are sorted by name; channels keep the file's order.
     std::ranges::sort(places_);
-    std::vector<MappedColumn> ordered;
-    for (const auto& [line, column, i] : places_) ordered.push_back(map.columns[i]);
-    map.columns = std::move(ordered);
+    map.columns = mapped(places_, [&](auto& place) { return map.columns[std::get<2>(place)]; });
     places_.clear();
     // Of six by six numbers about x, y, z and turns about these, as ROS has them.
     static constexpr int kPlanar[] = {0, 1, 5, 7, 11, 35};
@@ -185,10 +180,8 @@ class MapReader {
   }
 
   void check_noise(const TomlSection& section, const TableMap& map) {
-    std::string missing;
-    for (const std::string& role : map.noise()) {
-      if (map.find(role) == nullptr) missing += (missing.empty() ? "" : ", ") + role;
-    }
+    const auto is_missing = [&](const std::string& role) { return map.find(role) == nullptr; };
+    const std::string missing = joined(filtered(map.noise(), is_missing));
     if (!missing.empty()) {
       errors_.add(section.table().source().begin, section.name() + " has no " + missing +
                                                       ", expected all of " + map.noise().front() +
@@ -262,20 +255,17 @@ const MappedColumn* TableMap::find(std::string_view role) const {
 }
 
 std::span<const std::string> TableMap::noise() const {
+  const auto there = [&](const std::string& role) { return find(role) != nullptr; };
   for (const auto* roles : {&kCovarianceColumns, &kDeviationColumns}) {
-    for (const std::string& role : *roles) {
-      if (find(role) != nullptr) return *roles;
-    }
+    if (std::ranges::any_of(*roles, there)) return *roles;
   }
   return {};
 }
 
 double unit_factor(std::string_view unit) {
   if (unit.empty()) return 1;
-  for (const Unit& known : kUnits) {
-    if (unit == known.name) return known.factor;
-  }
-  return 0;
+  const Unit* known = find_by(kUnits, unit, &Unit::name);
+  return known ? known->factor : 0;
 }
 
 std::span<const std::string> known_units() {
@@ -317,10 +307,8 @@ Result<LogMap> parse_map(std::string_view text, const std::string& file) {
 
 bool to_pose(const TableMap& map, std::vector<double>& values) {
   const auto value = [&](std::string_view role) {
-    for (std::size_t i = 0; i < map.columns.size(); ++i) {
-      if (map.columns[i].role == role) return values[i];
-    }
-    return 0.0;
+    const MappedColumn* column = map.find(role);
+    return column ? values[static_cast<std::size_t>(column - map.columns.data())] : 0;
   };
   const bool y_up = map.up == "y";
   double theta = value("theta");

@@ -35,24 +35,21 @@ Result<std::string> unit_of(const LogTable& table, const MappedColumn& c) {
 
 bool has_number(const LogTable& table, const std::string& column) {
   const std::size_t at = *table.find(column);
-  for (std::size_t r = 0; r < table.rows(); ++r) {
-    if (std::isfinite(table.at(r, at))) return true;
-  }
-  return false;
+  return std::ranges::any_of(indices(table.rows()),
+                             [&](std::size_t r) { return std::isfinite(table.at(r, at)); });
 }
 
 }  // namespace
 
 Result<SiLine> si_line(const LogTable& table, const TableMap& map, const MappedColumn& c,
                        bool poses) {
-  const Result<std::string> unit = unit_of(table, c);
-  if (!unit) return unit.error();
-  double factor = unit_factor(*unit);
-  const bool length = *unit == "m" || *unit == "cm" || *unit == "mm";
-  const bool speed = unit->ends_with("/s") && unit->find("m/") != unit->npos;
+  ASSIGN_OR_RETURN(const std::string unit, unit_of(table, c));
+  double factor = unit_factor(unit);
+  const bool length = unit == "m" || unit == "cm" || unit == "mm";
+  const bool speed = unit.ends_with("/s") && unit.find("m/") != unit.npos;
   const bool rim = !poses && (speed || (c.rate && length)) && c.role != "v" && c.role != "vy";
   if (rim && map.wheel_radius_m <= 0) {
-    return Error{table.source + ":1: found column " + quoted_word(c.column) + " in " + *unit +
+    return Error{table.source + ":1: found column " + quoted_word(c.column) + " in " + unit +
                  ", expected the wheels' radius too; print the map (--print-map), add "
                  "wheel_radius = 0.05 (m) to it and give it by --map"};
   }
@@ -71,8 +68,8 @@ Error no_rows(const std::vector<Recording>& recordings, const TableMap& map,
   std::vector<std::string> columns;
   for (const Recording& recording : recordings) {
     for (const LogTable& table : recording.tables) {
-      columns.insert(columns.end(), table.columns.begin(), table.columns.end());
-      columns.insert(columns.end(), table.titles.begin(), table.titles.end());
+      append(columns, table.columns);
+      append(columns, table.titles);
       for (const MappedColumn& c : map.columns) {
         if (!has_all(table, map) || has_number(table, c.column)) continue;
         return Error{table.source + ":1: found no number in column " + quoted_word(c.column) +

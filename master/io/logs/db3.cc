@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
 #include "master/io/logs/topics.h"
@@ -71,17 +72,16 @@ class Db3Bag {
         prepare("SELECT topic_id, timestamp, data, id FROM messages ORDER BY timestamp, id"));
     int code = SQLITE_ROW;
     while ((code = sqlite3_step(rows.get())) == SQLITE_ROW) {
-      const auto found = by_id_.find(sqlite3_column_int64(rows.get(), 0));
-      if (found == by_id_.end()) return broken();
+      BagTopic* topic = find_in(by_id_, sqlite3_column_int64(rows.get(), 0));
+      if (!topic) return broken();
       const sqlite3_int64 ns = sqlite3_column_int64(rows.get(), 1);
       const double t =
           static_cast<double>(ns / 1'000'000'000) + 1e-9 * static_cast<double>(ns % 1'000'000'000);
       const auto* data = static_cast<const char*>(sqlite3_column_blob(rows.get(), 2));
       const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows.get(), 2));
       const std::string_view bytes(data == nullptr ? "" : data, data == nullptr ? 0 : size);
-      if (Status s = topics_.add(found->second, t, bytes); !s) {
-        return Error{path_ + ":1: message " + text_of(rows.get(), 3) + ": " + s.error().message};
-      }
+      RETURN_IF_ERROR(
+          under(path_ + ":1: message " + text_of(rows.get(), 3), topics_.add(*topic, t, bytes)));
     }
     if (code != SQLITE_DONE) return broken();
     return {};

@@ -35,10 +35,8 @@ std::optional<Columns> columns_of(const LogTable& table) {
 
 bool changes(const LogTable& table, const Columns& columns) {
   return std::ranges::any_of(columns, [&](std::size_t c) {
-    for (std::size_t r = 1; r < table.rows(); ++r) {
-      if (table.at(r, c) != table.at(0, c)) return true;
-    }
-    return false;
+    return std::ranges::any_of(indices(table.rows()),
+                               [&](std::size_t r) { return table.at(r, c) != table.at(0, c); });
   });
 }
 

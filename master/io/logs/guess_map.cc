@@ -65,19 +65,14 @@ const std::vector<Role> kWheelRoles = {
 
 // The numbers of a column that are there.
 std::vector<double> numbers(const LogTable& table, const std::string& column) {
-  std::vector<double> all;
   const auto at = table.find(column);
-  if (!at) return all;
-  for (std::size_t r = 0; r < table.rows(); ++r) {
-    if (std::isfinite(table.at(r, *at))) all.push_back(table.at(r, *at));
-  }
-  return all;
+  if (!at) return {};
+  return filtered(mapped(indices(table.rows()), [&](std::size_t r) { return table.at(r, *at); }),
+                  [](double value) { return std::isfinite(value); });
 }
 
 double greatest(const std::vector<double>& values) {
-  double most = 0;
-  for (const double value : values) most = std::max(most, std::abs(value));
-  return most;
+  return max_of(values, [](double value) { return std::abs(value); });
 }
 
 class Guess {
@@ -142,13 +137,17 @@ class Guess {
         are_durations(numbers(table, time), unit_factor(unit.empty() ? table.unit_of(time) : unit));
   }
 
+  static void add_columns(const LogTable& table, const std::vector<Role>& roles, TableMap& to) {
+    for (const Role& role : roles) {
+      const std::string column = column_of(table, role.aliases);
+      if (!column.empty()) to.columns.push_back({role.name, column, ""});
+    }
+  }
+
   void guess_poses(const LogTable& table, const std::string& time, bool odometry) {
     TableMap found;
     start(table, time, found);
-    for (const Role& role : kPoseRoles) {
-      const std::string column = column_of(table, role.aliases);
-      if (!column.empty()) found.columns.push_back({role.name, column, ""});
-    }
+    add_columns(table, kPoseRoles, found);
     const auto there = [&](const char* role) { return found.find(role) != nullptr; };
     if (!there("x") && !there("y") && !there("theta")) guess_motions(table, found);
     const bool quaternion = there("qx") && there("qy") && there("qz") && there("qw");
@@ -213,10 +212,7 @@ class Guess {
     for (const std::vector<Role>& set : kCommandRoles) {
       TableMap found;
       start(table, time, found);
-      for (const Role& role : set) {
-        const std::string column = column_of(table, role.aliases);
-        if (!column.empty()) found.columns.push_back({role.name, column, ""});
-      }
+      add_columns(table, set, found);
       if (found.columns.size() != set.size() + 1) continue;
       for (MappedColumn& c : found.columns) {
         if (c.role == "t" || stated(table, c.column)) continue;
@@ -247,9 +243,9 @@ class Guess {
   void guess_wheels(const LogTable& table, const std::string& time) {
     TableMap found;
     start(table, time, found);
-    for (const Role& role : kWheelRoles) {
-      const std::string column = column_of(table, role.aliases);
-      if (!column.empty()) found.columns.push_back({role.name, column, rim_unit(table, column)});
+    add_columns(table, kWheelRoles, found);
+    for (std::size_t k = 1; k < found.columns.size(); ++k) {
+      found.columns[k].unit = rim_unit(table, found.columns[k].column);
     }
     // Joint states: a column velocity.NAME a joint.
     if (found.columns.size() == 1 && table.type.find("JointState") != std::string::npos) {

@@ -1,6 +1,7 @@
 #include <boost/crc.hpp>
 #include <map>
 
+#include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
 #include "master/io/logs/topics.h"
@@ -102,9 +103,8 @@ class McapReader : BagRecords {
     const std::string encoding(cursor.text());
     if (!cursor.good()) return broken(at);
     if (channels_.count(id) != 0) return {};
-    const auto found = schemas_.find(schema_id);
-    if (found != schemas_.end()) {
-      const Schema& s = found->second;
+    if (const Schema* found = find_in(schemas_, schema_id)) {
+      const Schema& s = *found;
       read.type = s.name;
       read.wire = encoding == "ros1" ? MessageWire::kRos1 : MessageWire::kCdr;
       const bool text = s.encoding == "ros1msg" || s.encoding == "ros2msg";
@@ -128,14 +128,14 @@ class McapReader : BagRecords {
     const auto log_time = cursor.number<std::uint64_t>();
     cursor.take(8);  // time of publishing
     if (!cursor.good()) return broken(at);
-    const auto found = channels_.find(id);
-    if (found == channels_.end()) {
+    BagTopic* channel = find_in(channels_, id);
+    if (!channel) {
       return error(at, "a message of channel " + std::to_string(id),
                    "its channel record before it");
     }
     const double t = static_cast<double>(log_time / 1'000'000'000) +
                      1e-9 * static_cast<double>(log_time % 1'000'000'000);
-    return add(at, found->second, t, cursor.rest());
+    return add(at, *channel, t, cursor.rest());
   }
 
   std::map<std::uint16_t, Schema> schemas_;

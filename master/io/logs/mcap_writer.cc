@@ -3,6 +3,7 @@
 #include <limits>
 #include <map>
 
+#include "common/base/ranges.h"
 #include "master/io/logs/bags.h"
 
 namespace gapfarm {
@@ -40,9 +41,7 @@ std::string sized(std::string_view text) {
 }
 
 std::string map_bytes(const std::map<U16, U64>& map) {
-  std::string bytes;
-  for (const auto& [key, value] : map) bytes += number(key) + number(value);
-  return sized(bytes);
+  return sized(joined(map, "", [](auto& one) { return number(one.first) + number(one.second); }));
 }
 
 std::string written(WrittenOp op, std::string_view content) {
@@ -116,8 +115,7 @@ std::string McapWriter::channel_records() const {
 }
 
 std::string McapWriter::finish() {
-  std::ranges::stable_sort(
-      messages_, [](const Message& a, const Message& b) { return a.time_ns < b.time_ns; });
+  std::ranges::stable_sort(messages_, {}, &Message::time_ns);
   std::string file(kMcapMagic), chunk_rows;
   file += written(kWrittenHeader, sized("") + sized("gapfarm"));
   U32 chunks = 0;

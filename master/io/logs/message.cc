@@ -115,8 +115,8 @@ class MessageDecoder {
                                                               {"string", &D::word},
                                                               {"time", &D::stamp},
                                                               {"duration", &D::stamp}};
-    const auto found = kReaders.find(primitive);
-    return found == kReaders.end() ? nullptr : found->second;
+    const Read* found = find_in(kReaders, primitive);
+    return found ? *found : nullptr;
   }
 
  private:
@@ -222,8 +222,7 @@ bool serves_ground_robots(std::string_view type) {
       "Odometry",     "JointState",   "PoseStamped",      "PoseWithCovarianceStamped",
       "Pose2D",       "TFMessage",    "TransformStamped", "Imu",
       "BatteryState", "String"};
-  const std::string_view name = type.substr(type.rfind('/') + 1);
-  return std::find(std::begin(kServed), std::end(kServed), name) != std::end(kServed);
+  return contains(kServed, type.substr(type.rfind('/') + 1));
 }
 
 Status MessageSchema::check(const std::string& type, int depth) const {
@@ -284,8 +283,7 @@ Result<MessageSchema> MessageSchema::parse(const std::string& type, std::string_
     for (Field& field : fields) {
       if (field.read != nullptr || schema.types_.count(field.type) != 0) continue;
       const std::string package = holder.substr(0, holder.find('/') + 1);
-      const std::string name = field.type == "Header" ? "std_msgs/Header" : package + field.type;
-      field.type = name;
+      field.type = field.type == "Header" ? "std_msgs/Header" : package + field.type;
     }
   }
   RETURN_IF_ERROR(schema.check(schema.type_, 0));

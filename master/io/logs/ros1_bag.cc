@@ -1,6 +1,7 @@
 #include <map>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
@@ -97,14 +98,14 @@ class BagReader : BagRecords {
     const auto id = number<std::uint32_t>(header, "conn");
     if (op == kConnection) return connection(begin, id, header["topic"], data);
     if (op != kBagMessage) return {};
-    const auto found = connections_.find(id);
-    if (found == connections_.end()) {
+    BagTopic* topic = find_in(connections_, id);
+    if (!topic) {
       return error(begin, "a message of connection " + std::to_string(id),
                    "its connection record before it");
     }
     ByteCursor time(header["time"]);
     const auto s = time.number<std::uint32_t>(), ns = time.number<std::uint32_t>();
-    return add(begin, found->second, s + 1e-9 * ns, data);
+    return add(begin, *topic, s + 1e-9 * ns, data);
   }
 
   Status connection(std::uint64_t begin, std::uint32_t id, const std::string& topic,

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -12,8 +13,8 @@ constexpr std::size_t kMostNumbers = 100'000'000;
 constexpr std::size_t kMostColumns = 512;  // of one topic
 
 std::string text_in(const MessageContent& content, const std::string& path) {
-  const auto found = content.texts.find(path);
-  return found == content.texts.end() ? "" : found->second;
+  const std::string* found = find_in(content.texts, path);
+  return found ? *found : "";
 }
 
 // "velocity[3]" to its array and element.

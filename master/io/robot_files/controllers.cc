@@ -127,8 +127,7 @@ std::string drive_of_type(std::string_view type) {
 }  // namespace
 
 const StatedNumber* DriveFacts::number(const std::string& wanted) const {
-  const auto found = numbers.find(wanted);
-  return found == numbers.end() ? nullptr : &found->second;
+  return find_in(numbers, wanted);
 }
 
 std::vector<std::string> DriveFacts::joints_of(const std::vector<std::string>& roles) const {

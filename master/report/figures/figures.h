@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 

@@ -137,10 +137,9 @@ std::string summary(const RunReport& report) {
 
 std::string score_table(const std::vector<ScoreRow>& rows, const std::string& column,
                         const char* file) {
-  std::vector<HtmlRow> lines;
-  for (const ScoreRow& row : rows) {
-    lines.push_back({html_escaped(row.name), {row.score ? number_text(*row.score, 5) : "–"}});
-  }
+  const auto lines = mapped(rows, [](const ScoreRow& row) -> HtmlRow {
+    return {html_escaped(row.name), {row.score ? number_text(*row.score, 5) : "–"}};
+  });
   return html_table("parts", file, file, {{""}, {html_escaped(column), "number", "score"}}, lines);
 }
 
@@ -250,9 +249,7 @@ Result<RunOutcome> parse_run_outcome(const std::string& text) {
   root.list("validation", outcome.validation, kScore);
   root.list("baselines", outcome.baselines, kScore);
   if (!error.empty()) return Error{error};
-  auto trials = parse_trials(json["trials"], {});
-  if (!trials) return trials.error();
-  outcome.trials = std::move(*trials);
+  ASSIGN_OR_RETURN(outcome.trials, parse_trials(json["trials"], {}));
   return outcome;
 }
 

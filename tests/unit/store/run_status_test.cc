@@ -26,7 +26,7 @@ TEST_F(RunStatusTest, IsRunningWhileTheMasterHoldsTheLock) {
   Result<RunStore> store = RunStore::create(run(), example_info());
   ASSERT_TRUE(store.ok());
   EXPECT_EQ(status().state, RunState::kRunning);
-  EXPECT_EQ(status().generation, 0u);
+  EXPECT_EQ(status().last.generation, 0u);
 
   ASSERT_TRUE(store->commit(example_generation(1)).ok());
   Progress progress;

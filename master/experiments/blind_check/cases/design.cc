@@ -144,9 +144,8 @@ void record_size(const ParameterTable& table, const Arena& arena, const v1::Task
 Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm) {
   const ParameterTable& table = planned.table();
   const std::string hash = farm.add_problem(to_proto(planned));
-  std::vector<v1::Task> tasks;
-  for (const Truth& truth : drafts.cases) tasks.push_back(predict_task(planned, truth));
-  ASSIGN_OR_RETURN(const auto base, farm.run(hash, tasks));
+  const auto task_of = [&](const Truth& truth) { return predict_task(planned, truth); };
+  ASSIGN_OR_RETURN(const auto base, farm.run(hash, mapped(drafts.cases, task_of)));
   for (const v1::TaskResult& result : base) {
     RETURN_IF_ERROR(ended_well(result, "a robot near the config's",
                                "; the config's values do not make one that drives"));
@@ -183,11 +182,6 @@ TrueEffect true_effect(const ParameterTable& table, const Sizing& sizing) {
   return effect;
 }
 
-std::string case_name(std::size_t number) {
-  const std::string digits = std::to_string(number);
-  return "case" + std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
-}
-
 BlindDesign deal(const ParameterTable& table, const DesignSettings& settings, Drafts drafts) {
   BlindDesign design;
   std::vector<bool> possible(drafts.cases.size(), true);
@@ -204,7 +198,7 @@ BlindDesign deal(const ParameterTable& table, const DesignSettings& settings, Dr
   for (const std::size_t i : stream.permutation(drafts.cases.size())) {
     if (!possible[i]) continue;
     design.cases.push_back(std::move(drafts.cases[i]));
-    design.cases.back().id = case_name(design.cases.size());
+    design.cases.back().id = formatted("case%03zu", design.cases.size());
   }
   return design;
 }
@@ -222,7 +216,7 @@ Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::ve
     const auto sessions = simulate_tasks(
         plan.empty() ? draw_plan(config.problem, config.simulate, seed) : plan,
         overrides_of(problem.table(), cases[i]), seed, config.simulate.path_interval_s);
-    tasks.insert(tasks.end(), sessions.begin(), sessions.end());
+    append(tasks, sessions);
     owner.insert(owner.end(), sessions.size(), i);
   }
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));

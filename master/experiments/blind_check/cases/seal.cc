@@ -16,11 +16,6 @@ namespace gapfarm {
 
 namespace {
 
-const std::vector<std::string>& kind_names() {
-  static const std::vector<std::string> names = {"null", "single", "pair", "outside"};
-  return names;
-}
-
 // A number, or the word of a choice as its index.  None for anything else: an effect outside the
 // catalogue may have parameters of any form, and nothing compares them.
 std::optional<double> parameter_value(const std::string& effect, const std::string& key,
@@ -54,28 +49,20 @@ Error wrong(const std::string& file, const std::string& what) {
 
 const Effect* catalogue_entry(const std::string& name) {
   for (const std::span<const Effect> catalogue : {srv1_effects_and_seconds(), push_effects()}) {
-    for (const Effect& effect : catalogue) {
-      if (effect.name == name) return &effect;
-    }
+    if (const Effect* effect = find_by(catalogue, name, &Effect::name)) return effect;
   }
   return nullptr;
 }
 
 const char* case_kind_name(CaseKind kind) {
-  return kind_names()[static_cast<std::size_t>(kind)].c_str();
+  constexpr const char* kNames[] = {"null", "single", "pair", "outside"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 std::string answer_of(const Truth& truth) {
-  switch (truth.kind) {
-    case CaseKind::kNull:
-      return "none";
-    case CaseKind::kOutside:
-      return "unknown";
-    case CaseKind::kSingle:
-    case CaseKind::kPair:
-      break;
-  }
-  return "effect";
+  return truth.kind == CaseKind::kNull      ? "none"
+         : truth.kind == CaseKind::kOutside ? "unknown"
+                                            : "effect";
 }
 
 std::string format_truth(const Truth& truth) {
@@ -119,8 +106,7 @@ Result<Truth> parse_truth(const std::string& text, const std::string& file, cons
     LenientFields(sizes).field(name.c_str(), effect.size);
     truth.effects.push_back(std::move(effect));
   }
-  const Json seed = json.value("seed", Json());
-  if (seed.is_number_unsigned()) truth.seed = seed.get<std::uint64_t>();
+  fields.field("seed", truth.seed);
   const Json robot = json.value("robot", Json::object());
   if (robot.is_object()) {
     for (const auto& [key, value] : robot.items()) {
@@ -174,9 +160,8 @@ std::string seal_of(std::string_view salt, std::string_view truth) {
 }
 
 std::string format_seals(const std::vector<SealedTruth>& truths) {
-  std::string text;
-  for (const SealedTruth& t : truths) text += t.id + " " + seal_of(t.salt, t.truth) + "\n";
-  return text;
+  return joined(truths, "",
+                [](const SealedTruth& t) { return t.id + " " + seal_of(t.salt, t.truth) + "\n"; });
 }
 
 Status verify_seals(const std::vector<SealedTruth>& truths, std::string_view seals,
