@@ -102,7 +102,7 @@ TextFormat sniff_format(std::string_view text) {
   if (line.empty()) return TextFormat::kEmpty;
   if (has(line, "CAMPOSE") || has(line, "WAYPOINTS")) return TextFormat::kBlendersim;
   if (line[0] == '<') return TextFormat::kHtml;
-  if (line[0] == '{') return TextFormat::kJson;
+  if (line[0] == '{' || line == "[" || line.starts_with("[{")) return TextFormat::kJson;
   const bool table_head = line[0] == '[' && has(line, "]");
   const bool key_value = has(line, " = ") || (line[0] == '#' && has(text, " = "));
   if (table_head || key_value) return TextFormat::kToml;

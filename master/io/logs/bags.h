@@ -56,11 +56,16 @@ struct Recording {
 
 // Reads text logs: tables with a header (separated by commas, semicolons or tabs; decimal commas;
 // rows of units and of other names above the numbers; rostopic echo -p and PlotJuggler included),
-// ros2 topic echo --csv of the usual types, TUM, OptiTrack Motive.  Recognised by its content.
+// JSON objects, ros2 topic echo --csv of the usual types, TUM, OptiTrack Motive.  Recognised by its
+// content.
 // Errors name file, line, what was found and expected; nothing is half-read, unless `skip_invalid`:
 // then rows with mistakes are omitted with a note for each, and most of them are an error.
 Result<Recording> parse_text_log(std::string_view text, const std::string& file,
                                  bool skip_invalid = false);
+
+// Rows of JSON objects, one a line or all in one array, below a head with the paths to their
+// values.
+Result<std::vector<CsvRow>> rows_of_json(std::string_view text, const std::string& file);
 
 class ByteSource {
  public:

@@ -335,9 +335,13 @@ bool looks_like_tum(std::string_view text) {
 Result<Recording> parse_form(std::string_view text, const std::string& file, Mistakes& mistakes) {
   const TextFormat format = sniff_format(text);
   const bool other = format == TextFormat::kEmpty || format == TextFormat::kHtml ||
-                     format == TextFormat::kJson || format == TextFormat::kUtf16 ||
-                     format == TextFormat::kBinary || format == TextFormat::kRunStore;
+                     format == TextFormat::kUtf16 || format == TextFormat::kBinary ||
+                     format == TextFormat::kRunStore;
   if (other) return wrong_format(file, format, "a log of drives");
+  if (format == TextFormat::kJson) {
+    ASSIGN_OR_RETURN(auto objects, rows_of_json(text, file));
+    return parse_headed(std::move(objects), file, ',', mistakes);
+  }
   if (looks_like_tum(text)) return parse_tum(text, file, mistakes);
   const std::string commas = blanks_to_commas(text);
   if (!commas.empty()) text = commas;

@@ -253,6 +253,29 @@ TEST(TextLogs, RowsWithMistakesAreOmittedWhereThatIsWanted) {
   EXPECT_EQ(parse_text_log(tum, "f.txt", true)->tables[0].rows(), 3u);
 }
 
+TEST(TextLogs, ObjectsOfJsonAreRowsOfATable) {
+  const std::string poses[] = {R"({"t": 10, "pose": {"x": 1, "y": 2, "yaw": 0.5}})",
+                               R"({"t": 10.1, "pose": {"yaw": 0.6, "x": 1.1, "y": 2}})"};
+  const std::string commands =
+      "{\"t\": 10, \"v\": 0.3, \"omega\": -0.2}\n"
+      "{\"t\": 10.1, \"v\": 0.3, \"omega\": -0.2}\n";
+  expect_the_drive(read({poses[0] + "\n\n" + poses[1] + "\n", commands}));
+  expect_the_drive(read({"[\n " + poses[0] + ",\n " + poses[1] + "\n]\n", commands}));
+  // Three numbers are a pose, nine its covariance.
+  const auto scans = parse_text_log(
+      R"([{"T": 0.2, "sm": [0.1, 0.2, 0.3], "cov": [[1, 2, 3], [2, 4, 5], [3, 5, null]]}])", "f");
+  ASSERT_TRUE(scans) << scans.error().message;
+  EXPECT_THAT(scans->tables[0].columns,
+              ElementsAre("T", "sm.x", "sm.y", "sm.theta", "cov_xx", "cov_xy", "cov_xt", "cov_yy",
+                          "cov_yt", "cov_tt"));
+  EXPECT_EQ(scans->tables[0].values[9 - 2], 4);
+  EXPECT_THAT(error_of("{\"t\": 1, \"x\": 2}\n{\"t\": 1, \"x\": \n"),
+              AllOf(StartsWith("f.csv:2:1: found 0 fields"), HasSubstr("--skip-invalid")));
+  for (const char* none : {"[{\n", "{\n \"t\": 1\n}\n", "{}"}) {
+    EXPECT_THAT(error_of(none), HasSubstr("found JSON, expected objects with numbers")) << none;
+  }
+}
+
 TEST(LogMaps, UnitsAreOfTheColumnsKind) {
   const std::string poses = "[poses]\nt = \"t\"\nx = \"x\"\ny = \"y\"\n";
   const auto wrong = parse_map(poses + "theta = { column = \"yaw\", unit = \"mm\" }\n", "m.toml");
