@@ -368,10 +368,18 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
   const std::size_t folds = 1 + *std::ranges::max_element(observations_.fold);
   for (std::size_t f = 0; f < folds; ++f) {
     const Fit left = linear_step(fit, f);
+    const auto factor = normal(fit, f).matrix.llt();
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       if (observations_.fold[i] != f || !learns_from(i, std::nullopt)) continue;
-      const double squares = squares_of(left.z, static_cast<Eigen::Index>(i));
-      scores[i] = score_of(observations_.loss, squares, left.scale);
+      const auto at = static_cast<Eigen::Index>(3 * i);
+      const Eigen::MatrixXd along =
+          factor.matrixL().solve(fit.slopes.middleRows<3>(at).transpose());
+      const Eigen::Matrix3d spread =
+          Eigen::Matrix3d::Identity() + along.transpose() * along / (left.scale * left.scale);
+      const Eigen::LLT<Eigen::Matrix3d> of_spread(spread);
+      const Eigen::Vector3d z = of_spread.matrixL().solve(left.z.segment<3>(at));
+      scores[i] = score_of(observations_.loss, z.squaredNorm(), left.scale) -
+                  of_spread.matrixLLT().diagonal().array().log().sum();
     }
   }
   return scores;

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <vector>
 
@@ -99,8 +98,8 @@ class Fitter {
   Fit linear_step(const Fit& fit, std::optional<std::size_t> without_fold = std::nullopt) const;
   // Log score of every observation with such residuals, under the scale that is best for them.
   std::vector<double> scores(const Eigen::VectorXd& z) const;
-  // Log score of every observation from fits to the other folds, linear steps from this one; 0 of
-  // those without weight.
+  // Log score of every observation from fits to the other folds, linear steps from this one, as
+  // unsure as they leave its prediction; 0 of those without weight.
   // REQUIRES: slopes.
   std::vector<double> held_out(const Fit& fit) const;
 
