@@ -64,7 +64,7 @@ bool contaminated_at_line(const Signature& chosen, const ResidualTrial& trial) {
 EffectDiagnosis first_seam() {
   return {
       .effect = "camera_seam",
-      .searched = {{"offset_x", 0.005}, {"offset_y", 0.005}, {"slope_x", 0.01}, {"slope_y", 0.01}},
+      .searched = {{"offset_x", 0.05}, {"offset_y", 0.05}, {"slope_x", 0.05}, {"slope_y", 0.05}},
       .marks = lines,
       .bends_view = true,
       .start = start_seam,
