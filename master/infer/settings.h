@@ -62,11 +62,11 @@ inline constexpr double kBlindStep = 0.5;
 inline constexpr std::size_t kLeaders = 5;
 // hypotheses, patches, headings | round | That go on to the end.
 inline constexpr std::size_t kFinalists = 3;
-// s.e., tolerances | derived: one case in forty | A lead over an alternative, a gain that is to
-// stay or a value that moved is no chance from here on.
+// s.e., tolerances | derived: one case in forty | A lead over an alternative or a value that moved
+// is no chance from here on.
 inline constexpr double kSureGain = 2;
-// s.e. | round | The same for a gain to be considered at all: a few observations carry it
-// otherwise. Against chance guards the least gain.
+// s.e. | round | The same for a gain to be considered at all, and to stay: a few observations carry
+// it otherwise. Against chance guards the least gain.
 inline constexpr double kLeastSure = 1;
 // effects | chosen: a robot of which four values were wrong | That are named of one log.
 inline constexpr std::size_t kMostNames = 4;

@@ -215,7 +215,7 @@ class Selection {
       ASSIGN_OR_RETURN(auto without, fitted(std::move(space), u));
       const infer::PairedGain gain =
           infer::gain_over(found_->model, without, competition_.base().dimensions());
-      if (gain.sum >= of_.subject.least_gain && gain.sum >= kSureGain * gain.se) {
+      if (gain.sum >= of_.subject.least_gain && gain.sum >= kLeastSure * gain.se) {
         found_->chosen[k].gain = gain.sum;
         first += size_of(k++);
         continue;
