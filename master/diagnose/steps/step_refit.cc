@@ -1,6 +1,7 @@
 // The fits behind the figures.
 
 #include <algorithm>
+#include <set>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -196,6 +197,7 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   Explanation& named = refit.judged.named;
   const std::size_t found = named.chosen.size();
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
+  std::set<std::string> put_last;
   for (;;) {
     ASSIGN_OR_RETURN(refit.nested, nested_fits(of, named, folds));
     emit_gaps(of, refit.nested);
@@ -213,6 +215,12 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
       idle = of_no_use(refit.judged, refit.nested, refit.floor);
     }
     if (!idle) break;
+    // Alone it may fit nothing that another one beside it does: it goes if it adds nothing to all.
+    const auto at = named.chosen.begin() + static_cast<std::ptrdiff_t>(idle->effect);
+    if (at + 1 != named.chosen.end() && put_last.insert(at->effect()).second) {
+      std::rotate(at, at + 1, named.chosen.end());
+      continue;
+    }
     refit.judged = dropped(std::move(refit.judged), *idle);
   }
   const auto missing = missing_too_much(refit);
