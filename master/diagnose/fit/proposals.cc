@@ -1,7 +1,6 @@
 #include "master/diagnose/fit/proposals.h"
 
 #include <algorithm>
-#include <functional>
 
 #include "common/base/ranges.h"
 #include "common/effects/catalogue.h"
@@ -10,7 +9,6 @@
 #include "master/infer/settings.h"
 
 namespace gapfarm {
-namespace {}  // namespace
 
 double least_gain_of(const std::string& effect, const Study& study, double explained) {
   if (kind_of(effect) != effect) {
@@ -53,6 +51,7 @@ Result<std::vector<EffectCandidate>> Proposals::candidates(
     const Regression& explained, const std::set<std::string>& without,
     const std::vector<EffectCandidate>& beside) const {
   std::map<std::string, EffectCandidate> best;
+  std::map<std::string, std::vector<EffectCandidate>> lines;  // of seams
   double most = 0;
   const auto see = [&](const std::vector<Signature>& signatures) {
     for (const Signature& s : signatures) {
@@ -60,6 +59,7 @@ Result<std::vector<EffectCandidate>> Proposals::candidates(
       if (name.empty()) continue;
       const double gain = net_gain(explained, s);
       most = std::max(most, gain);
+      if (is_seam(name)) lines[name].push_back({gain, s});
       const auto [entry, fresh] = best.try_emplace(name, EffectCandidate{gain, s});
       if (!fresh && gain > entry->second.gain) entry->second = {gain, s};
     }
@@ -73,7 +73,7 @@ Result<std::vector<EffectCandidate>> Proposals::candidates(
   for (auto& [effect, candidate] : best) {
     if (candidate.gain + candidate.signature.penalty < kWorthSearching) continue;
     if (candidate.gain < kWorthSearchingShare * most) continue;
-    if (is_seam(effect)) candidate = refine_seam(explained, candidate);
+    if (is_seam(effect)) candidate = refine_seam(explained, lines[effect], candidate);
   }
   drop_linear_views(explained, &best);
   for (auto& [effect, candidate] : best) {

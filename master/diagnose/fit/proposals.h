@@ -76,7 +76,10 @@ class Proposals {
                                          const std::optional<Patch>& beside) const;
   void drop_linear_views(const Regression& explained,
                          std::map<std::string, EffectCandidate>* best) const;
-  EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;
+  // Between the lines that were tried.
+  EffectCandidate refine_seam(const Regression& explained,
+                              const std::vector<EffectCandidate>& lines,
+                              EffectCandidate best) const;
 
   Predictor* predictor_;
   const Study* study_;

@@ -16,6 +16,7 @@ namespace gapfarm {
 namespace {
 
 constexpr int kSeamSteps = 10;
+constexpr double kWorthRefiningShare = 0.5;  // of the best line's gain
 // One that can be simulated and distinguished from none.
 constexpr double kLeastRadius_m = 0.05, kLeastRatio = 0.06, kMostRatio = 2.9;
 // The ratio is what the sketch is least sure of.
@@ -41,15 +42,22 @@ void Proposals::look_for_patches() {
   patch_search_ = study_->subject->patches(*predictor_, *study_);
 }
 
-EffectCandidate Proposals::refine_seam(const Regression& explained, EffectCandidate best) const {
-  // The gain jumps as readings change sides, so everything near is tried.
-  const int axis = static_cast<int>(best.signature.fixed.at("camera_seam.axis"));
-  const double coarse = best.signature.fixed.at("camera_seam.position");
-  for (int k = -kSeamSteps; k <= kSeamSteps; ++k) {
-    Signature s = seam_signature(*study_, axis, coarse + k * kSeamStep_m);
-    study_->drop_ignored(s.columns);
-    const double gain = net_gain(explained, s);
-    if (gain > best.gain) best = {gain, std::move(s)};
+EffectCandidate Proposals::refine_seam(const Regression& explained,
+                                       const std::vector<EffectCandidate>& lines,
+                                       EffectCandidate best) const {
+  // The gain jumps as readings change sides, so everything near is tried; the best line may lie
+  // between two that are not.
+  const double worth = kWorthRefiningShare * best.gain;
+  for (const EffectCandidate& line : lines) {
+    if (line.gain < worth) continue;
+    const int axis = static_cast<int>(line.signature.fixed.at("camera_seam.axis"));
+    const double coarse = line.signature.fixed.at("camera_seam.position");
+    for (int k = -kSeamSteps; k <= kSeamSteps; ++k) {
+      Signature s = seam_signature(*study_, axis, coarse + k * kSeamStep_m);
+      study_->drop_ignored(s.columns);
+      const double gain = net_gain(explained, s);
+      if (gain > best.gain) best = {gain, std::move(s)};
+    }
   }
   return best;
 }

@@ -12,6 +12,7 @@
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/fit/signatures.h"
+#include "master/diagnose/places/seam.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
@@ -209,11 +210,13 @@ TEST(StartValues, OfASlopeAreItsSizeAndDirection) {
 }
 
 struct Proposing {
-  explicit Proposing(std::vector<Signature> catalogue, const Eigen::VectorXd& data)
-      : study(plain_study(20)),
+  Proposing(std::vector<Signature> catalogue, const Eigen::VectorXd& data)
+      : Proposing(plain_study(20), std::move(catalogue), data) {}
+  Proposing(Study drives, std::vector<Signature> catalogue, const Eigen::VectorXd& data)
+      : study(std::move(drives)),
         problem(kinematic_log(20)),
         predictor(farm, problem),
-        nuisances(beyond_nothing(20, data)),
+        nuisances(beyond_nothing(study.size(), data)),
         proposals(predictor, study, std::move(catalogue), nuisances) {}
 
   std::vector<EffectCandidate> best(const std::set<std::string>& without = {}) {
@@ -240,6 +243,28 @@ TEST(Proposals, AreTheBestOfEachEffectBestFirst) {
   EXPECT_NEAR(best[0].gain, 9 * 10 / 2.0 - 0.5, 1e-6);
   EXPECT_NEAR(best[1].gain, 9 * 10 / 4.0 - 0.5, 1e-6) << "of two marks the better one";
   EXPECT_EQ(s.best({"motor_asymmetry"}).size(), 1u);
+}
+
+// Seed 43 of the blind check, case 22: the best of a few lines lay beside the best line of all.
+TEST(Proposals, OfASeamLookBetweenAllLinesThatAreNearlyTheBest) {
+  std::vector<double> starts;
+  const auto drives_from = [&](double first, double last, int count) {
+    for (int k = 0; k < count; ++k) starts.push_back(first + (last - first) * (k + 0.5) / count);
+  };
+  drives_from(0.34, 0.4, 3);
+  drives_from(0.4, 0.43, 14);
+  drives_from(0.43, 0.5, 12);
+  drives_from(0.5, 0.53, 3);
+  Study study = plain_study(starts.size());
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    study.trials[i].X_WS = {0, starts[i], 0};
+    study.trials[i].X_WP = {0, starts[i] + 0.1, 0};
+  }
+  const Eigen::VectorXd data = 3 * seam_signature(study, 1, 0.5).columns.col(0);
+  const Signature low = seam_signature(study, 1, 0.44), high = seam_signature(study, 1, 0.53);
+  Proposing s(study, {low, high}, data);
+  EXPECT_GT(net_gain(s.nuisances, low), net_gain(s.nuisances, high));
+  EXPECT_NEAR(s.best().front().signature.fixed.at("camera_seam.position"), 0.5, 0.0025);
 }
 
 TEST(Nuisances, HoldTheGaugesSlope) {
