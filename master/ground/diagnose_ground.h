@@ -2,11 +2,8 @@
 // what else is (docs/ground.md).
 #pragma once
 
-#include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/base/result.h"

@@ -1,6 +1,5 @@
 // Now and then a side slips: single drives are outliers, and lopsided ones.
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/ranges.h"
 #include "master/diagnose/effect_diagnosis.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "common/base/ranges.h"
 #include "master/diagnose/fit/free_commands.h"

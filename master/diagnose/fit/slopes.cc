@@ -1,7 +1,5 @@
 #include "master/diagnose/fit/slopes.h"
 
-#include <utility>
-
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {

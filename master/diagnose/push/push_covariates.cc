@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "common/parameters/table.h"
 #include "master/diagnose/fit/slopes.h"

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <concepts>
-#include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>

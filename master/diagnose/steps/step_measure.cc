@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 #include "common/base/ranges.h"
 #include "common/math/laws.h"

@@ -1,7 +1,6 @@
 // What the names of columns say.
 #include "master/io/logs/column_names.h"
 
-#include <algorithm>
 #include <cctype>
 #include <regex>
 

@@ -1,7 +1,6 @@
 // How a table's columns of two sides are to be read, by the motions beside them: to first order a
 // motion is linear in what the wheels turned by, wherever the tracked point is.
 #include <Eigen/Dense>
-#include <algorithm>
 #include <array>
 #include <cmath>
 
