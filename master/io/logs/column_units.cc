@@ -7,6 +7,7 @@
 #include "common/math/statistics.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
+#include "master/io/logs/column_names.h"
 
 namespace gapfarm {
 namespace {
@@ -18,10 +19,12 @@ constexpr double kLeastGrowth = 0.5;  // the same over the sum of all steps, wha
 constexpr double kLongestRow_s = 10;
 constexpr double kMostUneven = 10;
 
-// The map's unit, else the file's where the map does not say what one of the column is.
+// The map's unit, else the file's or the name's where the map does not say what one of the column
+// is.
 Result<std::string> unit_of(const LogTable& table, const MappedColumn& c) {
   if (!c.unit.empty() || c.scale != 1) return c.unit;
-  const std::string own = table.unit_of(c.column);
+  std::string own = table.unit_of(c.column);
+  if (own.empty()) own = unit_in_name(c.column);
   const bool none = own.empty() || own == "-";
   if (none || unit_factor(own) != 0) return none ? "" : own;
   const std::string role = c.role + " = { column = \"" + c.column + "\", ";

@@ -289,6 +289,26 @@ TEST(LogMaps, UnitsAreOfTheColumnsKind) {
   EXPECT_TRUE(parse_map(drive + "left = { column = \"v\", unit = \"%\" }\n", "m.toml"));
 }
 
+TEST(LogMaps, UnitsOfNamesCountWhereTheMapHasNone) {
+  const auto x_at_end = [](const std::string& x) {
+    const auto map = parse_map("[poses]\nt = \"t\"\nx = " + x +
+                                   "\ny = \"y\"\ntheta = \"yaw [deg]\"\n[commands]\nt = \"t\"\n"
+                                   "v = \"v (km/h)\"\nomega = \"w\"\n",
+                               "m.toml");
+    const auto log = parse_text_log(
+        "t,x (mm),y,yaw [deg],v (km/h),w\n0,0,0,0,3.6,0\n1,500,0,90,3.6,0\n", "f.csv");
+    const auto runs = to_runs({*log}, *map);
+    EXPECT_TRUE(runs) << runs.error().message;
+    const LoggedRun& run = runs->log.runs[0];
+    EXPECT_NEAR(run.poses[1].X_WM.theta, std::numbers::pi / 2, 1e-9);
+    EXPECT_NEAR(run.commands[1].values[0], 1, 1e-9);
+    return run.poses[1].X_WM.x;
+  };
+  EXPECT_NEAR(x_at_end("\"x (mm)\""), 0.5, 1e-12);
+  EXPECT_NEAR(x_at_end("{ column = \"x (mm)\", unit = \"cm\" }"), 5, 1e-12);
+  EXPECT_NEAR(x_at_end("{ column = \"x (mm)\", scale = 0.002 }"), 1, 1e-12);
+}
+
 TEST(LogMaps, AColumnThatNoTableHasIsNamed) {
   const auto map =
       parse_map("[poses]\nt = \"t\"\nx = \"x_mn\"\ny = \"y_mm\"\ntheta = \"yaw\"\n", "m.toml");
