@@ -2,6 +2,7 @@
 // by the path to its value.
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <unordered_map>
 #include <utility>
 
 #include "common/base/text.h"
@@ -13,6 +14,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using Leaves = std::vector<std::pair<std::string, std::string>>;  // paths and texts
+
+// Longer arrays (a scan's ranges) are no columns, and what lies deeper is no log.
+constexpr std::size_t kLongestArray = 64;
+constexpr int kDeepestObject = 16;
 
 // Three numbers are a planar pose, three times three its covariance.
 std::string name_of_element(std::size_t k, std::size_t size) {
@@ -26,28 +31,26 @@ bool is_covariance(const Json& value) {
          });
 }
 
-std::string text_of(const Json& value) {
-  if (value.is_null()) return "";
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
-
-void add_leaves(const std::string& path, const Json& value, Leaves* leaves) {
+void add_leaves(const std::string& path, const Json& value, int depth, Leaves* leaves) {
   const std::string to = path.empty() ? "" : path + ".";
+  if (depth > kDeepestObject || (value.is_array() && value.size() > kLongestArray)) return;
   if (is_covariance(value)) {
     constexpr char kAxes[] = "xyt";
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t k = i; k < 3; ++k) {
-        leaves->emplace_back(path + "_" + kAxes[i] + kAxes[k], text_of(value[i][k]));
+        add_leaves(path + "_" + kAxes[i] + kAxes[k], value[i][k], depth + 1, leaves);
       }
     }
   } else if (value.is_array()) {
     for (std::size_t k = 0; k < value.size(); ++k) {
-      add_leaves(to + name_of_element(k, value.size()), value[k], leaves);
+      add_leaves(to + name_of_element(k, value.size()), value[k], depth + 1, leaves);
     }
   } else if (value.is_object()) {
-    for (const auto& [key, part] : value.items()) add_leaves(to + key, part, leaves);
+    for (const auto& [key, part] : value.items()) add_leaves(to + key, part, depth + 1, leaves);
+  } else if (value.is_string()) {
+    leaves->emplace_back(path, value.get<std::string>());
   } else {
-    leaves->emplace_back(path, text_of(value));
+    leaves->emplace_back(path, value.is_null() ? "" : value.dump());
   }
 }
 
@@ -57,7 +60,8 @@ Result<std::vector<CsvRow>> rows_of_json(std::string_view text, const std::strin
   std::vector<std::pair<Json, std::size_t>> objects;  // and their lines
   const auto parse = [](std::string_view some) { return Json::parse(some, nullptr, false); };
   if (text.find('[') < text.find('{')) {
-    for (const Json& object : parse(text)) objects.emplace_back(object, 1);
+    Json all = parse(text);
+    for (Json& object : all) objects.emplace_back(std::move(object), 1);
   } else {
     std::size_t number = 0;
     for (const std::string_view line : lines_of(text)) {
@@ -66,19 +70,21 @@ Result<std::vector<CsvRow>> rows_of_json(std::string_view text, const std::strin
     }
   }
   CsvRow names;
+  std::unordered_map<std::string, std::size_t> column;  // of a name
   std::vector<CsvRow> rows;
   for (const auto& [object, line] : objects) {
     const TextPlace place = {line, 1};
     CsvRow row{std::vector<CsvField>(names.fields.size(), CsvField{"", place}), place};
     Leaves leaves;
-    if (object.is_object()) add_leaves("", object, &leaves);
+    if (object.is_object()) add_leaves("", object, 0, &leaves);
     for (auto& [name, value] : leaves) {
-      const auto at = std::ranges::find(names.fields, name, &CsvField::text) - names.fields.begin();
-      if (at == std::ssize(names.fields) && rows.empty()) {
+      if (rows.empty() && column.try_emplace(name, column.size()).second) {
         names.fields.push_back({name, place});
         row.fields.push_back({});
       }
-      if (at < std::ssize(names.fields)) row.fields[static_cast<std::size_t>(at)] = {value, place};
+      if (const auto at = column.find(name); at != column.end()) {
+        row.fields[at->second] = {std::move(value), place};
+      }
     }
     // Another number of fields than the head's: its reader says so.
     if (leaves.empty()) row.fields.clear();

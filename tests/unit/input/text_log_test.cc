@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <regex>
 
 #include "common/recordings/run.h"
 #include "common/trials/files.h"
@@ -271,6 +272,13 @@ TEST(TextLogs, ObjectsOfJsonAreRowsOfATable) {
   EXPECT_EQ(scans->tables[0].values[9 - 2], 4);
   EXPECT_THAT(error_of("{\"t\": 1, \"x\": 2}\n{\"t\": 1, \"x\": \n"),
               AllOf(StartsWith("f.csv:2:1: found 0 fields"), HasSubstr("--skip-invalid")));
+  const std::string deep(100000, '['), scan(3 * 1080, '7');
+  const auto odd = parse_text_log("{\"t\": 1, \"x\": 2, \"deep\": " + deep +
+                                      std::string(deep.size(), ']') + ", \"ranges\": [" +
+                                      std::regex_replace(scan, std::regex("777"), "77,") + "1]}\n",
+                                  "f");
+  ASSERT_TRUE(odd) << odd.error().message;
+  EXPECT_THAT(odd->tables[0].columns, ElementsAre("t", "x"));
   for (const char* none : {"[{\n", "{\n \"t\": 1\n}\n", "{}"}) {
     EXPECT_THAT(error_of(none), HasSubstr("found JSON, expected objects with numbers")) << none;
   }
