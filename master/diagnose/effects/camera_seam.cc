@@ -61,6 +61,8 @@ bool contaminated_at_line(const Signature& chosen, const ResidualTrial& trial) {
   return std::abs(to[axis] - line) < 0.03 || std::abs(from[axis] - line) < 0.01;
 }
 
+// Sizes: cameras over one arena disagreed by 20 cm (docs/evidence/diagnosis.md, a real
+// robot), which is as far as the prior expects.
 EffectDiagnosis first_seam() {
   return {
       .effect = "camera_seam",
