@@ -6,13 +6,13 @@
 #include <utility>
 
 #include "common/base/text.h"
+#include "common/json/json.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
 
 namespace gapfarm {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Leaves = std::vector<std::pair<std::string, std::string>>;  // paths and texts
 
 // Longer arrays (a scan's ranges) are no columns, and what lies deeper is no log.
@@ -50,7 +50,7 @@ void add_leaves(const std::string& path, const Json& value, int depth, Leaves* l
   } else if (value.is_string()) {
     leaves->emplace_back(path, value.get<std::string>());
   } else {
-    leaves->emplace_back(path, value.is_null() ? "" : value.dump());
+    leaves->emplace_back(path, value.is_null() ? "" : json_text(value));
   }
 }
 
@@ -58,15 +58,14 @@ void add_leaves(const std::string& path, const Json& value, int depth, Leaves* l
 
 Result<std::vector<CsvRow>> rows_of_json(std::string_view text, const std::string& file) {
   std::vector<std::pair<Json, std::size_t>> objects;  // and their lines
-  const auto parse = [](std::string_view some) { return Json::parse(some, nullptr, false); };
   if (text.find('[') < text.find('{')) {
-    Json all = parse(text);
+    Json all = parse_json(text);
     for (Json& object : all) objects.emplace_back(std::move(object), 1);
   } else {
     std::size_t number = 0;
     for (const std::string_view line : lines_of(text)) {
       ++number;
-      if (!tokens_of(line).empty()) objects.emplace_back(parse(line), number);
+      if (!tokens_of(line).empty()) objects.emplace_back(parse_json(line), number);
     }
   }
   CsvRow names;
