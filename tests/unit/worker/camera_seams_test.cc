@@ -97,11 +97,36 @@ TEST(Views, AReadingMayBeOfEitherSideWhereBothReportIt) {
   EXPECT_EQ(Views(gap).recovered({1.05, 0.5, 0.2}, 0.003).size(), 1u);
 }
 
+// A drive that is predicted to end 8 mm before the line and was read beyond it, where only the far
+// camera reads, was read by that one: a miss of 8 mm, not one of the whole shift.
+TEST(Views, AnEndIsReadByTheCameraThatMayHaveReadIt) {
+  const ActiveEffects seam = effects({{"camera_seam.offset_y", 0.06}, {"camera_seam.position", 1}});
+  const Views views(seam);
+  const Pose X_WS{0.5, 0.5, 0}, X_SE{0.492, 0, 0};
+  const auto far = views.logged_end(X_WS, X_SE, {1.01, 0.56, 0}, 0.002);
+  EXPECT_NEAR(far.y, 0.56, 1e-12);
+  EXPECT_NEAR(far.x, 0.992, 1e-12);
+  EXPECT_NEAR(views.logged_end(X_WS, X_SE, {0.98, 0.5, 0}, 0.002).y, 0.5, 1e-12);
+  // Within the noise of a reading of the line, either: by what it reads.
+  EXPECT_NEAR(views.logged_end(X_WS, X_SE, {0.999, 0.558, 0}, 0.002).y, 0.56, 1e-12);
+  EXPECT_NEAR(views.logged_end(X_WS, X_SE, {0.999, 0.503, 0}, 0.002).y, 0.5, 1e-12);
+}
+
+TEST(Views, AStartThatTwoCamerasReportIsWhereTheLoggedEndShows) {
+  const ActiveEffects seam = effects({{"camera_seam.offset_x", -0.1}, {"camera_seam.position", 1}});
+  const Pose X_WS{0.95, 0.5, 0}, X_SE{0.2, 0, 0};
+  // From 0.95, beyond the line at 1.15; from 1.05, at 1.25: each read 0.1 less.
+  EXPECT_NEAR(Views(seam).logged_end(X_WS, X_SE, {1.06, 0.5, 0}, 0.003).x, 1.05, 1e-12);
+  EXPECT_NEAR(Views(seam).logged_end(X_WS, X_SE, {1.13, 0.5, 0}, 0.003).x, 1.15, 1e-12);
+}
+
 TEST(Views, WithoutASeamAreWhatIsObserved) {
   const ActiveEffects lens = effects({{"camera_aspect.ratio", 1.1}});
   const Pose X{0.4, 0.9, 0.3};
   const auto seen = Views(lens).observed(X, {1, 1}), from = Views(lens).recovered(X, 1);
   ASSERT_EQ(seen.size() + from.size(), 2u);
+  const Pose X_SE{0.1, 0, 0.2};
+  EXPECT_EQ(Views(lens).logged_end(X, X_SE, {}, 1), lens.observe(lens.recover(X) * X_SE));
   EXPECT_EQ(seen[0].pose, lens.observe(X));
   EXPECT_EQ(from[0].pose, lens.recover(X));
 }

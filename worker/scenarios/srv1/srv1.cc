@@ -25,7 +25,7 @@ struct PreparedTrial {
   DrivenCommand drive;
   TrialContext context;
   std::size_t command = 0;
-  Pose X_WS;
+  Pose X_WS, X_WE;
 };
 
 Grouping group_trials(const std::vector<PreparedTrial>& trials, bool by_last_direction) {
@@ -114,7 +114,8 @@ class Srv1Model : public ScenarioModel {
     forget_over_moves(driven, &contexts);
     for (std::size_t i = 0; i < driven.size(); ++i) {
       const Trial& trial = problem.log.trials[i];
-      trials_.push_back({driven[i], contexts[i], command_index(trial.command), trial.X_WS});
+      trials_.push_back(
+          {driven[i], contexts[i], command_index(trial.command), trial.X_WS, trial.X_WE});
     }
     by_drive_ = group_trials(trials_, false);
     by_drive_and_last_ = group_trials(trials_, true);
@@ -245,7 +246,8 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
       X_SE = motion.spread_end(direct.X_SE);
     }
     if (options.means_only) {
-      prediction.trials.push_back({{{1, robot.effects().observe(X_WR * X_SE)}}});
+      const double sd_m = robot.noise().pose.position_m;
+      prediction.trials.push_back({{{1, views.logged_end(trial.X_WS, X_SE, trial.X_WE, sd_m)}}});
     } else {
       prediction.trials.push_back(observe(robot, views, motion, X_SE, trial));
     }

@@ -64,4 +64,27 @@ std::vector<View> Views::recovered(const Pose& X_WM, double sd_m) const {
   return normalised(std::move(views));
 }
 
+Pose Views::logged_end(const Pose& X_WS, const Pose& X_SE, const Pose& logged, double sd_m) const {
+  if (from_.empty()) return effects_.observe(effects_.recover(X_WS) * X_SE);
+  std::vector<const ActiveEffects*> views;
+  for (const ActiveEffects& view : from_) {
+    const auto sides = static_cast<unsigned>(&view - from_.data());
+    const Pose X_WR = view.recover(logged);
+    if (likelihood(sides, X_WR, {sd_m, sd_m}) >= kLeastWeight) views.push_back(&view);
+  }
+  if (views.empty()) views = {&effects_};
+  Pose nearest;
+  double least = INFINITY;
+  for (const View& start : recovered(X_WS, sd_m)) {
+    for (const ActiveEffects* view : views) {
+      const Pose end = view->observe(start.pose * X_SE);
+      const double miss = std::hypot(end.x - logged.x, end.y - logged.y);
+      if (miss >= least) continue;
+      least = miss;
+      nearest = end;
+    }
+  }
+  return nearest;
+}
+
 }  // namespace gapfarm
