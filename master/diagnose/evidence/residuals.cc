@@ -37,7 +37,7 @@ double one_of_two(std::vector<double> gaps, double quantum, double far, double h
 }  // namespace
 
 Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP) {
-  return local_difference(X_WP, trial.X_WE) - trial.late;
+  return local_difference(X_WP, trial.X_WE) - trial.late - trial.bent;
 }
 
 Eigen::Matrix3d reading_covariance(const ResidualTrial& trial, const PoseNoise& noise) {

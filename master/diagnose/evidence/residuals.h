@@ -43,6 +43,8 @@ struct ResidualTrial {
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   // What readings that came late did to it: omitted from the residual.
   Eigen::Vector3d late = Eigen::Vector3d::Zero();
+  // What its session's gain does to it beyond first order: omitted, too.
+  Eigen::Vector3d bent = Eigen::Vector3d::Zero();
   // Change of the predicted end for a unit change of each side's gain.
   Eigen::Vector3d left = Eigen::Vector3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();

@@ -112,6 +112,38 @@ TEST(SessionGains, PredictATrialByItsSession) {
   EXPECT_NEAR(gained, fit.gain, 0.3 * fit.gain + 10);
 }
 
+// A turn that is a quarter longer ends along its arc, not along its last direction.
+TEST(SessionGains, LeaveNothingOfALongerTurn) {
+  const std::vector<double> gains = {0.25, -0.2, 0.1, -0.15};
+  SessionLog log(7, {0, 0, 0, 0});
+  std::vector<Eigen::Vector3d> left;
+  for (std::size_t i = 0; i < log.residuals.size(); ++i) {
+    ResidualTrial& t = log.study.trials[i];
+    if (t.command == 1) t.left = Eigen::Vector3d(0.2, 0, 2.5) - t.right;
+    const Eigen::Vector3d r = log.residuals[i];
+    t.X_WP = exp(of_gain(t));
+    t.X_WE = t.X_WP * exp(gains[t.session] * of_gain(t)) * Pose{r[0], r[1], r[2]};
+    left.push_back(residual_of(t, t.X_WP));
+  }
+  log.study.use_noise(kTruth);
+  const auto missed = [&](const SpreadFit& fit) {
+    double squares = 0;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      const ResidualTrial& t = log.study.trials[i];
+      const double y = left[i].y() - fit.sessions[t.session].gain * of_gain(t).y();
+      if (t.command == 1) squares += y * y / static_cast<double>(left.size() / 2);
+    }
+    return std::sqrt(squares);
+  };
+  EXPECT_GT(missed(fit_session_gains(log.study, left, kOutliers)), 0.009);
+  bend_by_session_gains(fit_session_gains(log.study, left, kOutliers).sessions, &log.study, &left);
+  const SpreadFit fit = fit_session_gains(log.study, left, kOutliers);
+  EXPECT_LT(missed(fit), 0.0025) << "the noise of the readings, 1.5 mm each, and of turns";
+  for (std::size_t s = 0; s < gains.size(); ++s) {
+    EXPECT_NEAR(fit.sessions[s].gain, gains[s], 0.002) << s;
+  }
+}
+
 // A nuisance has a prior of its own width.
 TEST(SessionGains, LeaveColumnsToTheSessionsAlone) {
   const SessionLog log(6, {0, 0, 0});
