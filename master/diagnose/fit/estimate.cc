@@ -171,13 +171,13 @@ double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
 }
 
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
-                                           const Signature& signature) {
+                                           const Signature& signature, double times) {
   // Coefficients of the columns, given everything else.
   const Eigen::MatrixXd& columns = signature.columns;
   Eigen::MatrixXd ridged = columns.transpose() * columns;
   ridged.diagonal() *= 1 + 1e-6;
   return values_at(study, others, signature,
-                   solve_symmetric(ridged, columns.transpose() * others.left()));
+                   times * solve_symmetric(ridged, columns.transpose() * others.left()));
 }
 
 std::map<std::string, double> values_at(const Study& study, const Regression& others,

@@ -67,9 +67,10 @@ double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
 Result<bool> move_seams(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
                         JointFit* fit);
 
-// Parameter values at which a refinement of the effect begins.
+// Parameter values at which a refinement of the effect begins: those of so many times what the
+// signature's columns take.
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
-                                           const Signature& signature);
+                                           const Signature& signature, double times = 1);
 
 // The same where the columns' coefficients are these.
 std::map<std::string, double> values_at(const Study& study, const Regression& others,

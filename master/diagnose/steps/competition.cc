@@ -41,6 +41,10 @@ std::vector<SearchedSize> searched_of(const EffectDiagnosis& effect) {
   });
 }
 
+// A mark at a place takes drives for others that begin or end within its shift of a line, and is
+// the less like them the larger it is: times what it takes of the data.
+constexpr double kFartherStarts[] = {2, 3};
+
 // Two sizes to either side of nothing: every corner of the box, or four directions.
 std::vector<infer::Start> corners(const infer::Space& own) {
   constexpr double kFar = 2;  // sizes
@@ -153,9 +157,16 @@ infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
   h.from_neutral = false;
   const auto dimensions = static_cast<double>(base_.only(h.coordinates).dimensions());
   h.luck = std::max(0.0, mark.signature.penalty - dimensions / 2);
-  infer::Start& start = h.starts.emplace_back();
-  set_values(of_.table(), start_values(study_, explained, mark.signature), &start.at);
+  const auto start_at = [&](double times) {
+    const auto values = start_values(study_, explained, mark.signature, times);
+    set_values(of_.table(), values, &h.starts.emplace_back().at);
+  };
+  start_at(1);
+  if (of_.subject.effects->row(kind_of(h.name)).marks != nullptr) {
+    for (const double times : kFartherStarts) start_at(times);
+  }
   if (!mark.signature.whole) return h;
+  infer::Start& start = h.starts.front();
   // What has a place does nothing elsewhere.
   h.promised = mark.gain;
   h.touched = [this, effect = h.name](const Overrides& at) { return touched_by(effect, at); };
