@@ -122,6 +122,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   PredictOptions options;
   options.trials = {task.trials().data(), static_cast<std::size_t>(task.trials_size())};
   options.means_only = task.means_only();
+  options.planned = task.planned();
   options.headings = task.headings();
   options.stream = task.stream();
   options.steps = steps;

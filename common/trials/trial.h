@@ -37,7 +37,7 @@ struct Trial {
   std::optional<double> left, right;  // duty of each side, [-1, 1]; none: the config's
   std::optional<double> duration_s;   // none: the config's
   Pose X_WS;                          // before
-  Pose X_WE;                          // after the robot came to rest; of plans: zero
+  Pose X_WE;                          // after the robot came to rest
   std::vector<std::string> extra;     // values of TrialLog::extra_columns
   std::vector<PathSample> path;       // empty: not logged
   std::vector<TipSample> tip;         // push logs only: what was done; times increase

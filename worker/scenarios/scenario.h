@@ -50,6 +50,7 @@ inline constexpr std::size_t kMostHeadings = 32;
 struct PredictOptions {
   std::span<const std::uint32_t> trials;  // indices into the problem's log; empty: all
   bool means_only = false;                // one alternative a trial, no covariance
+  bool planned = false;                   // the log's ends are of a robot without what is predicted
   // Of such a motion, even; 0: as many as it takes.  Where they are reported, times are few, too.
   std::size_t headings = 0;
   v1::StreamKey stream;          // only SpreadKind::kSampled draws from it

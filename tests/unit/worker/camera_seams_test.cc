@@ -110,9 +110,6 @@ TEST(Views, AnEndIsReadByTheCameraThatMayHaveReadIt) {
   // Within the noise of a reading of the line, either: by what it reads.
   EXPECT_NEAR(views.logged_end(X_WS, X_SE, {0.999, 0.558, 0}, 0.002).y, 0.56, 1e-12);
   EXPECT_NEAR(views.logged_end(X_WS, X_SE, {0.999, 0.503, 0}, 0.002).y, 0.5, 1e-12);
-  // A plan has no end.
-  EXPECT_NEAR(views.logged_end(X_WS, X_SE, {}, 0.002).y, 0.5, 1e-12);
-  EXPECT_NEAR(views.logged_end(X_WS, {0.51, 0, 0}, {}, 0.002).y, 0.56, 1e-12);
 }
 
 TEST(Views, AStartThatTwoCamerasReportIsWhereTheLoggedEndShows) {

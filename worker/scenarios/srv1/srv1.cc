@@ -247,7 +247,9 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     }
     if (options.means_only) {
       const double sd_m = robot.noise().pose.position_m;
-      prediction.trials.push_back({{{1, views.logged_end(trial.X_WS, X_SE, trial.X_WE, sd_m)}}});
+      const Pose X_WM = options.planned ? robot.effects().observe(X_WR * X_SE)
+                                        : views.logged_end(trial.X_WS, X_SE, trial.X_WE, sd_m);
+      prediction.trials.push_back({{{1, X_WM}}});
     } else {
       prediction.trials.push_back(observe(robot, views, motion, X_SE, trial));
     }

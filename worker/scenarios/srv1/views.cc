@@ -65,8 +65,7 @@ std::vector<View> Views::recovered(const Pose& X_WM, double sd_m) const {
 }
 
 Pose Views::logged_end(const Pose& X_WS, const Pose& X_SE, const Pose& logged, double sd_m) const {
-  const bool is_planned = logged == Pose();
-  if (from_.empty() || is_planned) return effects_.observe(effects_.recover(X_WS) * X_SE);
+  if (from_.empty()) return effects_.observe(effects_.recover(X_WS) * X_SE);
   std::vector<const ActiveEffects*> views;
   for (const ActiveEffects& view : from_) {
     const auto sides = static_cast<unsigned>(&view - from_.data());

@@ -31,7 +31,6 @@ class Views {
   // Where the end of a motion X_SE is logged that was logged to begin at X_WS.  Of the views that
   // may have reported the start and the end, those by which it comes nearest to the logged end: a
   // reading shows its camera better than a prediction does, which near a line may miss by more.
-  // Where none is logged (zero), by the predicted side.
   Pose logged_end(const Pose& X_WS, const Pose& X_SE, const Pose& logged, double sd_m) const;
 
  private:

@@ -119,6 +119,7 @@ v1::Task predict_task(const Problem& planned, const Truth& truth) {
   v1::Task task = prediction_task(overrides_of(planned.table(), truth), false);
   const std::size_t count = planned.log.trials.size();
   const std::size_t wanted = std::min(count, kMostSizeTrials);
+  task.mutable_predict()->set_planned(true);
   for (std::size_t i = 0; i < wanted; ++i) {
     task.mutable_predict()->add_trials(static_cast<std::uint32_t>(i * count / wanted));
   }
