@@ -55,6 +55,30 @@ Study with_whole_base(const DiagnosisRequest& of, Study study) {
   return study;
 }
 
+// The better fit of those from here and from where the config has the base: alone it was tuned into
+// a valley that it may not leave once effects explain what drew it there.
+Result<JointFit> fit_from_both(const DiagnosisRequest& of, const Study& study,
+                               const std::vector<EffectCandidate>& effects,
+                               const Overrides& start) {
+  const Eigen::MatrixXd none = no_nuisances(study);
+  const auto fit_from = [&](const Overrides& at) {
+    return fit_jointly(of.predictor, study, effects, at, BaseParameters::kFitted, none,
+                       kLongSearch);
+  };
+  ASSIGN_OR_RETURN(auto fit, fit_from(start));
+  // Where the base has to be searched anyway, that was done; where it is kept, it is the config's.
+  if (of.subject.base_moves || of.options.keep_base) return fit;
+  Overrides configured = start;
+  for (const BaseParameter& p : study.base_parameters) {
+    configured[p.row] = of.problem.values[p.row];
+  }
+  auto other = fit_from(configured);
+  if (!other && other.error().code == ErrorCode::kSimulation) return fit;
+  if (!other) return other;
+  return misfit_of(study, *other, none) < misfit_of(study, fit, none) ? std::move(*other)
+                                                                      : std::move(fit);
+}
+
 // The base alone, as it was logged and with late readings put right, then with one effect more at a
 // time.
 Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Explanation& named,
@@ -79,9 +103,9 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
         of, effects, alone && !named.tuned_alone.empty() ? named.tuned_alone : study.base);
     if (!alone) use_estimates(of, named, effects, &start);
     const Study& fitted_in = alone ? study : beside;
-    ASSIGN_OR_RETURN(auto fit,
-                     fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted,
-                                 none, alone ? base_rounds : kLongSearch));
+    ASSIGN_OR_RETURN(auto fit, alone ? fit_jointly(of.predictor, fitted_in, {}, start,
+                                                   BaseParameters::kFitted, none, base_rounds)
+                                     : fit_from_both(of, fitted_in, effects, start));
     if (!alone && count == named.chosen.size()) {
       ASSIGN_OR_RETURN(fit, profiled(of.predictor, fitted_in, effects, std::move(fit)));
     }
