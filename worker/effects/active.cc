@@ -91,10 +91,15 @@ Pose ActiveEffects::recover(Pose X_WM) const {
   return X_WM;
 }
 
-std::vector<double> ActiveEffects::beyond_lines(const Pose& X_WR) const {
+std::vector<double> ActiveEffects::beyond_lines(Pose X_WR, unsigned sides) const {
+  const ActiveEffects seen = seen_from(sides);
   std::vector<double> distances;
-  each(&EffectBehaviour::beyond,
-       [&](auto hook, auto& values) { distances.push_back(hook(values, X_WR)); });
+  for (std::size_t i = active_.size(); i-- > 0;) {
+    const Active& a = active_[i];
+    if (a.behaviour->beyond) distances.push_back(a.behaviour->beyond(a.values, X_WR));
+    if (a.behaviour->observe) X_WR = a.behaviour->observe(seen.active_[i].values, X_WR);
+  }
+  std::ranges::reverse(distances);
   return distances;
 }
 

@@ -109,9 +109,10 @@ class ActiveEffects {
   void floor(const Situation& situation, Floor& floor) const;
   Pose observe(Pose X_WR) const;
   Pose recover(Pose X_WM) const;
-  // Lines across which the view jumps: how far a pose lies beyond each, m; and the same effects
-  // seen as from these sides of them (bit k: beyond line k).
-  std::vector<double> beyond_lines(const Pose& X_WR) const;
+  // Lines across which the view jumps: how far a pose lies beyond each, m, seen as from these sides
+  // of them (bit k: beyond line k), and the same effects seen so.  As observe() has it, what lies
+  // nearer to the robot has shifted the pose by then.
+  std::vector<double> beyond_lines(Pose X_WR, unsigned sides) const;
   ActiveEffects seen_from(unsigned sides) const;
   Pose place(Pose X_WR) const;
   Pose unplace(Pose X_WR) const;

@@ -74,7 +74,10 @@ TEST(Views, HoldBothSidesNearALineAndOneElsewhere) {
   };
   EXPECT_EQ(weights({0.5, 0.5, 0}).size(), 1u);
   EXPECT_EQ(weights({0.5, 1.3, 0}), (std::vector<double>{0.5, 0.5}));
-  EXPECT_EQ(weights({1, 1.3, 0}), (std::vector<double>{0.25, 0.25, 0.25, 0.25}));
+  // Beyond the second line, whose shift takes it beyond the first one.
+  const auto corner = weights({1, 1.3, 0});
+  ASSERT_EQ(corner.size(), 3u);
+  EXPECT_NEAR(corner[2], 0.5, 1e-6);
   const auto near = weights({0.5, 1.31, 0});
   ASSERT_EQ(near.size(), 2u);
   EXPECT_NEAR(near[1], 0.8413, 1e-4) << "one standard deviation beyond";
@@ -118,6 +121,19 @@ TEST(Views, AStartThatTwoCamerasReportIsWhereTheLoggedEndShows) {
   // From 0.95, beyond the line at 1.15; from 1.05, at 1.25: each read 0.1 less.
   EXPECT_NEAR(Views(seam).logged_end(X_WS, X_SE, {1.06, 0.5, 0}, 0.003).x, 1.05, 1e-12);
   EXPECT_NEAR(Views(seam).logged_end(X_WS, X_SE, {1.13, 0.5, 0}, 0.003).x, 1.15, 1e-12);
+}
+
+// Beyond the second line, which shifts y by 6 cm, the first one is reached 6 cm earlier.
+TEST(Views, OfTwoSeamsMeetWhereReadingsDo) {
+  const ActiveEffects both = effects(two_seams());
+  const Views views(both);
+  Stream stream({5, Purpose::kTest, 0, 0, 0});
+  for (int i = 0; i < 200; ++i) {
+    const Pose X{1 + 0.2 * stream.uniform(), 1.2 + 0.2 * stream.uniform(), stream.uniform()};
+    const auto seen = views.observed(X, {1e-6, 1e-6});
+    ASSERT_EQ(seen.size(), 1u) << i;
+    EXPECT_LT(local_difference(seen[0].pose, both.observe(X)).norm(), 1e-12) << i;
+  }
 }
 
 TEST(Views, WithoutASeamAreWhatIsObserved) {

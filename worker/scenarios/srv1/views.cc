@@ -19,7 +19,7 @@ std::vector<View> normalised(std::vector<View> views) {
 }  // namespace
 
 Views::Views(const ActiveEffects& effects) : effects_(effects) {
-  const std::size_t lines = effects.beyond_lines({}).size();
+  const std::size_t lines = effects.beyond_lines({}, 0).size();
   for (unsigned sides = 0; lines > 0 && sides < 1u << lines; ++sides) {
     from_.push_back(effects.seen_from(sides));
   }
@@ -27,10 +27,13 @@ Views::Views(const ActiveEffects& effects) : effects_(effects) {
 
 double Views::likelihood(unsigned sides, const Pose& X_WR, const Eigen::Vector2d& sd_m) const {
   // A line across an axis is as far away as the distance grows along it.
-  constexpr double kStep_m = 1;
-  const std::vector<double> here = effects_.beyond_lines(X_WR);
-  const std::vector<double> along_x = effects_.beyond_lines({X_WR.x + kStep_m, X_WR.y, X_WR.theta});
-  const std::vector<double> along_y = effects_.beyond_lines({X_WR.x, X_WR.y + kStep_m, X_WR.theta});
+  constexpr double kStep_m = 1e-3;
+  const auto beyond_at = [&](double x, double y) {
+    return effects_.beyond_lines({x, y, X_WR.theta}, sides);
+  };
+  const std::vector<double> here = beyond_at(X_WR.x, X_WR.y);
+  const std::vector<double> along_x = beyond_at(X_WR.x + kStep_m, X_WR.y);
+  const std::vector<double> along_y = beyond_at(X_WR.x, X_WR.y + kStep_m);
   double product = 1;
   for (std::size_t k = 0; k < here.size(); ++k) {
     const double sd = std::hypot(sd_m.x() * (along_x[k] - here[k]) / kStep_m,
