@@ -9,7 +9,7 @@ is made wrong, or nothing.  Writes OUT/CASE/robot.toml, OUT/CASE/fit and OUT/CAS
 OUT/truth/CASE.json: what was done, how far it stands out of the model's residuals (`visible`: mean
 squared residual with the error over without), and by how many of the model's standard errors
 (`sigmas`; `bound` is the standard error, the least that any unbiased estimate has when the model is
-right).  scripts/diagnose_ground.sh diagnoses OUT.  Standard library only.
+right).  scripts/diagnose_ground.sh diagnoses OUT.  SEED: what is drawn.  Standard library only.
 """
 import json
 import math
@@ -21,7 +21,7 @@ import tempfile
 import ground_sets
 import plain_kinematics as plain
 
-SEED = 20261124
+SEED = int(os.environ.get("SEED", "20261124"))
 
 
 class Log:
