@@ -293,8 +293,10 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
   if (!best.nats.empty()) keep_if_best(search, std::move(best), std::move(what));
   keep_if_best(search, moved, far ? "moves of all values" : kSmallMoves);
   keep_if_best(search, fit_held_out(fitter, all, search->free_fit.values), "every value free");
-  if (search->smooth) {
-    keep_if_best(search, search->smooth->held_out, "a correction by " + search->smooth->depends_on);
+  if (std::optional<FreeResidual>& smooth = search->smooth) {
+    const std::string correction = "a correction by " + smooth->depends_on;
+    keep_if_best(search, smooth->held_out, correction);
+    if (!smooth->sure && search->best_of_all != correction) smooth.reset();
   }
   search->closable = held_out_gain(search->windows, search->best, before, work.seed);
 }

@@ -75,16 +75,17 @@ GroundNames with_names(const WindowFitter& fitter, const GroundWork& work,
   return again;
 }
 
-// A smooth correction of a prediction, where the log is sure that it closes more than is tolerated
-// beyond that and beyond all that `values` explain: robots that nobody touched have a little of it.
-std::optional<FreeResidual> sure_correction(const WindowFitter& fitter, const GroundWork& work,
-                                            const WindowFit& held_out, const WindowFit& values) {
+// A smooth correction of a prediction; sure where it closes more than is tolerated beyond that and
+// beyond all that `values` explain: robots that nobody touched have a little of it.
+std::optional<FreeResidual> correction(const WindowFitter& fitter, const GroundWork& work,
+                                       const WindowFit& held_out, const WindowFit& values) {
   std::optional<FreeResidual> smooth = fit_free_residual(fitter, held_out);
   const auto closes = [&](const WindowFit& before) {
     const HeldOutGain gain = held_out_gain(fitter.windows(), smooth->held_out, before, work.seed);
     return gain.lo > kToleratedGap;
   };
-  return smooth && closes(held_out) && closes(values) ? smooth : std::nullopt;
+  if (smooth) smooth->sure = closes(held_out) && closes(values);
+  return smooth;
 }
 
 // Takes away names that do not stand, one after the other: `stands` says so of each, beside what
@@ -127,14 +128,14 @@ void drop_stand_ins(const WindowFitter& fitter, const GroundWork& work, const Gr
                     GroundSearch* search) {
   if (search->reference) return;  // what both logs have is no change
   const WindowFit values = fit_held_out(fitter, all_free(search->fit.rows), search->fit.values);
-  search->smooth = sure_correction(fitter, work, search->chain.back(), values);
-  if (!search->smooth) return;
+  search->smooth = correction(fitter, work, search->chain.back(), values);
+  if (!search->smooth || !search->smooth->sure) return;
   const auto gain = [&](const WindowFit& with, const WindowFit& without) {
     return held_out_gain(search->windows, with, without, work.seed);
   };
   const auto stands = [&](const GroundStep& step, const GroundNames& others) {
-    auto without = sure_correction(fitter, work, others.chain.back(), values);
-    if (!without) return true;
+    auto without = correction(fitter, work, others.chain.back(), values);
+    if (!without || !without->sure) return true;
     // Of what acts in the world a correction by place says the same in more numbers.
     if (without->of_world && search->catalogue[step.chosen].of_world) return true;
     const HeldOutGain alone = gain(search->chain.back(), others.chain.back());

@@ -42,5 +42,17 @@ INSTANTIATE_TEST_SUITE_P(
                     Outside{"threshold", [](double c) { return std::abs(c) < 3 ? 0 : c; }, false}),
     [](const auto& of) { return std::string(of.param.what); });
 
+// Nor is a correction that closes more than is tolerated kept from the verdict because the log is not
+// sure that it does.
+TEST(OutsideTheCatalogue, WhatACorrectionMayCloseIsLeft) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const Kinematics as_filed = off_by({"left", "right", "separation", "lag", "marker_x", "marker_y"},
+                                     {1, 1, 1, 0.1, 0.02, 0.01});
+  const auto limited = [](double c) { return std::min(c, 8.6); };
+  const auto found = diagnose_ground(robot, driven(robot, as_filed, 1, 1, limited, 45), {});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->diagnosis.verdict, Verdict::kEffectAndUnknown) << found->diagnosis.headline;
+}
+
 }  // namespace
 }  // namespace gapfarm
