@@ -38,6 +38,7 @@ struct DriveBase {
   // Row of the speed at full duty.  Of a program's parameters tune_base() finds it, if there is
   // one.
   std::optional<std::size_t> speed;
+  bool alike = true;  // whether an unknown gain of all motions alike counts among nuisances
 };
 
 // Of srv1, or of what the problem's program declares: of that, `genes` are tuned whose values are

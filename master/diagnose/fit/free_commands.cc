@@ -307,7 +307,8 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
     probes.push_back({"", {{"motor_lag.tau", kLagStep}}, {}, kLagStep});
   }
   ASSIGN_OR_RETURN(const auto slopes, probe_all(predictor, study, probes));
-  std::vector<Eigen::VectorXd> columns = {0.3 * study.whiten(mapped(study.trials, of_gain))};
+  std::vector<Eigen::VectorXd> columns;
+  if (study.drive.alike) columns.push_back(0.3 * study.whiten(mapped(study.trials, of_gain)));
   for (std::size_t k = 0; k < probes.size(); ++k) {
     // Motors of some hundredths of a second are part of any robot.
     const bool lag = k == study.drive.retuned.size();

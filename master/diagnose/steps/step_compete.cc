@@ -337,6 +337,17 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Study& from
   return {};
 }
 
+// Evidence beside which the base's parameters are searched: to first order these would undo what
+// they do in simulations, and lead anywhere.
+Result<Evidence> evidence_for_search(const DiagnosisRequest& of, Study study) {
+  const auto searched = [&](std::size_t row) {
+    return contains(study.base_parameters, row, &BaseParameter::row);
+  };
+  std::erase_if(study.drive.retuned, [&](const RetunedParameter& p) { return searched(p.row); });
+  if (study.drive.speed && searched(*study.drive.speed)) study.drive.alike = false;
+  return evidence_of(of, std::move(study));
+}
+
 }  // namespace
 
 Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
@@ -354,7 +365,11 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
     // From its bounds a base hardly comes back.
     for (auto& [row, value] : study.base) value = of.problem.values[row];
   }
-  const Competition competition(of, study, evidence, found.first,
+  std::optional<Evidence> beside;
+  if (moves && !of.subject.base_moves) {
+    ASSIGN_OR_RETURN(beside, evidence_for_search(of, study));
+  }
+  const Competition competition(of, study, beside ? *beside : evidence, found.first,
                                 moves ? BaseParameters::kFitted : BaseParameters::kHeld);
   Screening screening;
   if (of.subject.signatures != nullptr) {

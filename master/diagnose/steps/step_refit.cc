@@ -167,6 +167,11 @@ bool explains_bounds(const Refit& refit) {
          base_on_bounds(named.study(), refit.nested.back().fit.at).empty();
 }
 
+// A base also comes free where it is on no bound.
+bool frees_from_bounds(const Evidence& measured, const Explanation& named) {
+  return named.frees_base && !measured.study.on_bounds.empty();
+}
+
 Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, Refit refit,
                           std::optional<SanityFinding> missing,
                           const std::vector<std::size_t>& folds) {
@@ -175,7 +180,7 @@ Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, 
   judged.named.estimates.reset();
   std::erase(judged.cautions, refit.correction);
   refit.correction.clear();
-  const bool bounded = judged.named.frees_base;
+  const bool bounded = frees_from_bounds(measured, judged.named);
   if (missing) judged = with_warning(std::move(judged), std::move(*missing));
   if (bounded) judged = with_base_warning(of, measured, std::move(judged));
   ASSIGN_OR_RETURN(refit.nested, nested_fits(of, judged.named, folds));
@@ -248,7 +253,7 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
     refit.judged = dropped(std::move(refit.judged), *idle);
   }
   const auto missing = missing_too_much(refit);
-  if (missing || (named.frees_base && !explains_bounds(refit))) {
+  if (missing || (frees_from_bounds(measured, named) && !explains_bounds(refit))) {
     return naming_none(of, measured, std::move(refit), missing, folds);
   }
   refit.judged = beside_the_rest(refit);
