@@ -13,10 +13,11 @@ import math
 import os
 import random
 import re
+import shutil
 import subprocess
 import sys
 
-STEP_S, NOISE_M, NOISE_RAD, APART_M = 0.005, 0.002, 0.004, 0.3
+STEP_S, NOISE_M, NOISE_RAD, APART_M, RADIUS_M = 0.005, 0.002, 0.004, 0.3, 0.05
 AHEAD = [-0.3, -0.1, -0.03, 0.02, 0.05, 0.1, 0.2, 0.3]
 TURN = [-0.8, -0.3, -0.1, 0, 0.05, 0.2, 0.5]
 
@@ -36,6 +37,33 @@ class Robot:
 
     def pose(self, x, y, theta):
         return x, y, theta
+
+
+class Eccentric(Robot):
+    """The left wheel's radius is 10 % more on one side of its axle than on the other."""
+
+    def __init__(self):
+        self.angle = 0.0
+
+    def motion(self, ahead, turn):
+        left = ahead - turn * APART_M / 2
+        self.angle += left / RADIUS_M * STEP_S
+        more = left * 0.1 * math.cos(self.angle)
+        return ahead + more / 2, turn - more / APART_M
+
+
+class Caster(Robot):
+    """A caster that flips pushes the robot aside in the first 0.3 s after each change of direction."""
+
+    def __init__(self):
+        self.ahead, self.since, self.side_of = 0.0, 1.0, 1
+
+    def motion(self, ahead, turn):
+        if ahead * self.ahead < 0:
+            self.since, self.side_of = 0.0, 1 if ahead > 0 else -1
+        self.ahead = ahead or self.ahead
+        self.since += STEP_S
+        return ahead, turn + (0.15 * self.side_of if self.since < 0.3 else 0)
 
 
 def with_side(change):
@@ -66,6 +94,8 @@ EFFECTS = {
     "backward": ("8 % slower backward", lambda: with_side(lambda v, t: v * (0.92 if v < 0 else 1))),
     "warming": ("10 % faster once warm (8 s)",
                 lambda: with_side(lambda v, t: v * (1.1 - 0.1 * math.exp(-t / 8)))),
+    "eccentric": ("a left wheel whose axle is 10 % off its middle", Eccentric),
+    "caster": ("a caster that turns the robot by 0.045 rad where it flips", Caster),
     "turning": ("up to 20 % slower in turns",
                 lambda: with_motion(lambda v, w: (v * (1 - 0.2 * abs(w) / 0.8), w))),
     "drift": ("turns by 0.02 rad/s of itself", lambda: with_motion(lambda v, w: (v, w + 0.02))),
@@ -81,7 +111,7 @@ def drive(folder, robot, seed):
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(folder, "robot.toml"), "w") as file:
         file.write('drive = "differential"\ncommands = ["v", "omega"]\n'
-                   f"wheel_separation = {APART_M}\nwheel_radius = 0.05\n")
+                   f"wheel_separation = {APART_M}\nwheel_radius = {RADIUS_M}\n")
     with open(os.path.join(folder, "commands.csv"), "w") as commands, \
             open(os.path.join(folder, "poses.csv"), "w") as poses:
         commands.write("run,t,v,omega\n")
@@ -116,11 +146,12 @@ def main():
         words, make = EFFECTS[name]
         for seed in (1, 2):
             folder = os.path.join(out, f"{name}_{seed}")
+            shutil.rmtree(folder, ignore_errors=True)
             drive(folder, make(), seed)
             config = os.path.join(folder, "config.toml")
             with open(config, "w") as file:
                 file.write('scenario = "ground"\n[robot]\nfile = "robot.toml"\n[runs]\nfolders = ["."]\n')
-            subprocess.run([program, "diagnose", config, "--out", os.path.join(folder, "out"), "--force"],
+            subprocess.run([program, "diagnose", config, "--out", os.path.join(folder, "out")],
                            check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             with open(os.path.join(folder, "out", "diagnosis.json")) as file:
                 said = json.load(file)

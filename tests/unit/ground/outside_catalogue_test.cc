@@ -42,8 +42,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Outside{"threshold", [](double c) { return std::abs(c) < 3 ? 0 : c; }, false}),
     [](const auto& of) { return std::string(of.param.what); });
 
-// Nor is a correction that closes more than is tolerated kept from the verdict because the log is not
-// sure that it does.
+// Nor is a correction that closes more than is tolerated kept from the verdict because the log is
+// not sure that it does.
 TEST(OutsideTheCatalogue, WhatACorrectionMayCloseIsLeft) {
   const GroundRobot robot = robot_of(kDifferential);
   const Kinematics as_filed = off_by({"left", "right", "separation", "lag", "marker_x", "marker_y"},
