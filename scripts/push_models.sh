@@ -1,6 +1,6 @@
 #!/bin/sh
 # How far the three models of a pushed piece end from where it ended, tuned on a part of a log and
-# judged on another (docs/pushing.md): tangram pieces, and a real triangle of Carnegie Mellon's.
+# judged on another (docs/evidence/pushing.md): tangram pieces, and a real triangle of Carnegie Mellon's.
 #
 #   scripts/push_models.sh TANGRAM/pushes.csv CMU/pushes.csv [further options of gapfarm crossfit]
 set -eu

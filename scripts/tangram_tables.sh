@@ -1,6 +1,6 @@
 #!/bin/sh
 # The tables of Weitnauer, Haschke and Ritter (2010) on a push log of tangram pieces: per-shape and
-# shared friction, extrapolation, and single parameters varied alone (docs/pushing.md).
+# shared friction, extrapolation, and single parameters varied alone (docs/evidence/pushing.md).
 #
 #   scripts/tangram_tables.sh pushes.csv [further options of gapfarm crossfit]
 set -eu
