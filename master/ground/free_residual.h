@@ -15,7 +15,7 @@ struct FreeResidual {
   std::string depends_on;  // "place, speeds"
   bool of_world = false;   // on place or heading
   std::string covariate;   // what it varies with above all: "left side's speed"
-  bool sure = false;       // that it closes more than is tolerated, for who measured it
+  bool sure = false;       // that it closes more than is tolerated; who judges it sets this
 };
 
 // Where a window that misses by this (m, m, rad, in the expected end's axes) is expected to end.

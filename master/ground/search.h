@@ -117,7 +117,8 @@ struct GroundSearch : GroundBasis, GroundNames {
   WindowFit best;
   std::string best_of_all;  // "floor_edge"
   HeldOutGain closable;
-  // What still foresees more than is tolerated, for sure, beside what is named; of no change.
+  // What still foresees something beside what is named, where the log is sure that it is more than
+  // is tolerated or nothing that was tried does better; of no change.
   std::optional<FreeResidual> smooth;
   std::vector<std::size_t> stand_ins;  // hypotheses that it foresees as much without
   double unexplained = 0;              // share_unexplained() by the best

@@ -176,9 +176,9 @@ TEST(PlanarCases, ATiltIsAllThatIsMissingOfARobotWithAnotherFriction) {
   the_only_tilt(folder / "out/cases/case001/trials.csv");
 }
 
-// Alone its base is tuned to a third of the length that it has beside the tilt.  hidden_tilt.csv:
-// the first session of case007 of `planar_cases --nulls 0 --clear 20 --subtle 0 --outside 7 --seed
-// 9003`.
+// Alone its base is tuned to a third of the robot's length, and to half of it beside the tilt.
+// hidden_tilt.csv: the first session of case007 of `planar_cases --nulls 0 --clear 20 --subtle 0
+// --outside 7 --seed 9003`.
 TEST(PlanarCases, ATiltThatTheTunedBaseHidesIsNamed) {
   const Json tilt =
       the_only_tilt(std::string(GAPFARM_SOURCE_DIR) + "/tests/planar/hidden_tilt.csv");
