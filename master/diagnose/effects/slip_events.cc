@@ -43,9 +43,9 @@ SpreadFit fit_slips(const Study& study, const std::vector<Eigen::Vector3d>& resi
   for (std::size_t i = 0; i < study.size(); ++i) informative[i] = !study.ignores(i);
   const SlipFit slip = fit_slip(study.trials, residuals, informative, study.noise);
   const double p = slip.probability, loss = slip.loss;
-  SpreadFit fit{
-      slip.gain,
-      {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}}};
+  SpreadFit fit{slip.gain,
+                {{"probability", p, 0.6 * p, std::min(1.0, 1.6 * p), "-"},
+                 {"loss", loss, 0.7 * loss, std::min(1.0, 1.4 * loss), "-"}}};
   fit.noise = slip.noise;
   if (slip.gain >= kLeastSlipGain && are_other_outliers(study, residuals, slip, informative)) {
     fit.odd =

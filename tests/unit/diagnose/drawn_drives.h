@@ -17,6 +17,13 @@ inline const NoiseEstimate kStart{kTruth.pose, 0.02, 0.02};
 struct Drawn {
   std::vector<ResidualTrial> trials;
   std::vector<Eigen::Vector3d> residuals;
+  std::vector<Twist> left, right;  // that each side adds to a trial's motion
+
+  // Where trial `i` ends when its sides lose such shares, seen from where it would.
+  Pose end(std::size_t i, double of_left, double of_right) const {
+    const Twist motion = left[i] + right[i];
+    return inverse(exp(motion)) * exp(Twist(motion - of_left * left[i] - of_right * right[i]));
+  }
 };
 
 // Forward and turning commands of three lengths; a side slips with `probability` and then loses up
@@ -27,18 +34,23 @@ inline Drawn draw(std::uint64_t seed, double probability = 0, double loss = 0) {
   for (std::size_t i = 0; i < 600; ++i) {
     const double path = 0.5 * static_cast<double>(1 + i % 3);
     const bool turns = i % 2 == 1;
+    drawn.left.push_back(path * (turns ? Twist(-0.04, 0, 0.45) : Twist(0.125, 0, -0.9)));
+    drawn.right.push_back(path * (turns ? Twist(0.04, 0, 0.45) : Twist(0.125, 0, 0.9)));
     ResidualTrial t;
     t.X_WS = {stream.uniform(0.3, 1.7), stream.uniform(0.3, 1.7),
               stream.uniform(-std::numbers::pi, std::numbers::pi)};
-    t.X_WP = t.X_WS * (turns ? Pose{0, 0, 0.9 * path} : Pose{0.25 * path, 0, 0});
-    const double ahead = turns ? -0.04 : 0.125;
-    t.left = path * Eigen::Vector3d(ahead, turns ? 0 : -0.1, turns ? 0.45 : -0.9);
-    t.right = path * Eigen::Vector3d(turns ? 0.04 : ahead, turns ? 0 : 0.1, turns ? 0.45 : 0.9);
+    t.X_WP = t.X_WS * exp(Twist(drawn.left[i] + drawn.right[i]));
+    constexpr double kStep = 1e-5;
+    t.left = -local_difference({}, drawn.end(i, kStep, 0)) / kStep;
+    t.right = -local_difference({}, drawn.end(i, 0, kStep)) / kStep;
     const Eigen::Matrix3d lower = trial_covariance(t, kTruth).llt().matrixL();
-    Eigen::Vector3d r = lower * Eigen::Vector3d(stream.normal(), stream.normal(), stream.normal());
-    if (stream.bernoulli(probability)) r -= loss * stream.uniform() * t.left;
-    if (stream.bernoulli(probability)) r -= loss * stream.uniform() * t.right;
-    drawn.residuals.push_back(r + probability * loss / 2 * (t.left + t.right));
+    const Eigen::Vector3d r =
+        lower * Eigen::Vector3d(stream.normal(), stream.normal(), stream.normal());
+    const double of_left = stream.bernoulli(probability) ? loss * stream.uniform() : 0;
+    const double of_right = stream.bernoulli(probability) ? loss * stream.uniform() : 0;
+    const Pose end = drawn.end(i, of_left, of_right) * Pose{r[0], r[1], r[2]};
+    drawn.residuals.push_back(local_difference({}, end) +
+                              probability * loss / 2 * (t.left + t.right));
     drawn.trials.push_back(t);
   }
   return drawn;

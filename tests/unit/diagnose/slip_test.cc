@@ -85,10 +85,11 @@ TEST(TrialsWithSlips, ScoreIsTheMixturesDensity) {
     double density = 0;
     constexpr int kDraws = 4000;
     for (int k = 0; k < kDraws; ++k) {
-      Eigen::Vector3d r = d.residuals[i] - 0.04 * (t.left + t.right);
-      if (stream.bernoulli(0.2)) r += 0.4 * stream.uniform() * t.left;
-      if (stream.bernoulli(0.2)) r += 0.4 * stream.uniform() * t.right;
-      density += std::exp(log_normal_density(r, *cov)) / kDraws;
+      const Eigen::Vector3d r = d.residuals[i] - 0.04 * (t.left + t.right);
+      const double left = stream.bernoulli(0.2) ? 0.4 * stream.uniform() : 0;
+      const double right = stream.bernoulli(0.2) ? 0.4 * stream.uniform() : 0;
+      const Eigen::Vector3d missed = local_difference(d.end(i, left, right), {r[0], r[1], r[2]});
+      density += std::exp(log_normal_density(missed, *cov)) / kDraws;
     }
     difference += std::abs(std::log(density) - judged[i].score) / 60;
   }
@@ -110,8 +111,8 @@ TEST(TrialsWithSlips, ReportsSlipsFromOtherOutliers) {
   Drawn d = draw(2);
   const SlipFit fit{.gain = 1, .probability = 0.05, .loss = 0.5, .noise = kTruth};
   for (std::size_t i = 0; i < 60; ++i) {
-    if (i % 2 == 0) {
-      d.residuals[i] -= 0.4 * d.trials[i].left;
+    if (i % 4 < 2) {
+      d.residuals[i] += local_difference({}, d.end(i, 0.4, 0));
     } else {
       d.residuals[i] += Eigen::Vector3d(0, 0.2, -0.6);
     }
@@ -120,10 +121,27 @@ TEST(TrialsWithSlips, ReportsSlipsFromOtherOutliers) {
   std::size_t slips = 0, others = 0;
   for (std::size_t i = 0; i < 60; ++i) {
     if (judged[i].squared < 11.5) continue;
-    (i % 2 == 0 ? slips : others) += (judged[i].nearest < 11.5) == (i % 2 == 0);
+    (i % 4 < 2 ? slips : others) += (judged[i].nearest < 11.5) == (i % 4 < 2);
   }
   EXPECT_GE(slips, 25U);
   EXPECT_GE(others, 25U);
+}
+
+// A side that loses most of its speed turns the robot by a radian and more, along an arc: to first
+// order it would end 0.2 m from there.
+TEST(TrialsWithSlips, FollowsGreatLosses) {
+  Drawn d = draw(5);
+  const SlipFit fit{.gain = 1, .probability = 0.05, .loss = 0.95, .noise = kTruth};
+  for (std::size_t i = 0; i < 60; ++i) {
+    const Eigen::Vector3d& r = d.residuals[i];
+    d.residuals[i] = local_difference(
+        {}, d.end(i, i % 4 < 2 ? 0.87 : 0, i % 4 < 2 ? 0 : 0.87) * Pose{r[0], r[1], r[2]});
+  }
+  const std::vector<SlipTrial> judged = trials_with_slips(d.trials, d.residuals, fit, 0, 0);
+  for (std::size_t i = 0; i < 60; ++i) {
+    EXPECT_GT(judged[i].squared, 11.5) << i;
+    EXPECT_LT(judged[i].nearest, 16) << i;
+  }
 }
 
 // Both sides at once slip once in forty drives where either slips in twenty: drives that go
