@@ -122,11 +122,7 @@ Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Di
   ASSIGN_OR_RETURN(const auto baselines, crossfitted_baselines(of.problem.log, of.problem.commands,
                                                                of.subject.folds(named.study())));
   const auto by_tuned = gapfarm::compare_with_baselines(baselines, refit.nested.front().scores);
-  std::vector<double> scores = refit.nested.back().scores;
-  for (const FoundSpread& found : named.spreads) {
-    if (!found.scores.empty()) scores = found.scores;
-  }
-  const auto by_model = gapfarm::compare_with_baselines(baselines, scores);
+  const auto by_model = gapfarm::compare_with_baselines(baselines, scores_with_all(refit));
   if (by_model.empty()) {
     d->provenance.emplace_back("without a simulation",
                                "no command is driven often enough to be learned from by itself");

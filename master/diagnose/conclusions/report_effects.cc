@@ -146,8 +146,8 @@ NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit, const F
   std::vector<double> gained;
   if (contains(named.first, found.effect, &Signature::effect)) {
     gained = gained_by(refit, 1);
-  } else if (!found.scores.empty()) {
-    gained = gains_over(found.scores, refit.nested.back().scores);
+  } else {
+    gained = found.gained;
   }
   if (gained.empty()) {
     // The gain is over all that the readings show; of the gap it can close what the means left.

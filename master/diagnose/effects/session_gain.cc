@@ -10,6 +10,7 @@ const SpreadRow kSessionSpread = {
     .fit = fit_session_gains,
     .scores = scores_with_session_gains,
     .by_session = true,
+    .rest = beside_session_gains,
 };
 
 }  // namespace

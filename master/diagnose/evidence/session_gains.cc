@@ -206,10 +206,15 @@ void bend_by_session_gains(const std::vector<SessionGain>& sessions, Study* stud
   study->use_predicted_ends(study->predicted_ends());
 }
 
-std::vector<double> scores_with_session_gains(const Study& study,
-                                              const std::vector<Eigen::Vector3d>& residuals,
-                                              const SpreadFit& fit, double outlier_share) {
-  const double spread = fit.estimates[0].value;
+namespace {
+
+struct ForeseenGains {
+  std::vector<Eigen::Vector3d> left;
+  std::vector<double> unknown;  // variance of the gain, a trial
+};
+
+ForeseenGains foreseen_gains(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                             double spread) {
   const Eigen::MatrixXd common = common_gains(study);
   const Eigen::VectorXd gains = whitened_gains(study), data = study.whiten(residuals);
   // What the log has in common counts as it is: a trial is predicted by the others' deviation.
@@ -217,32 +222,49 @@ std::vector<double> scores_with_session_gains(const Study& study,
   AtSpread at = medians_of(study, none, gains, data);
   const std::vector<double> weight = weights_at(study, none, gains, data, at);
   const SessionSums sums = sums_of(study, none, gains, data, weight);
-  std::vector<Eigen::Vector3d> left = residuals;
+  ForeseenGains foreseen{residuals, {}};
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const auto s = static_cast<Eigen::Index>(study.trials[i].session);
+    const auto row = static_cast<Eigen::Index>(3 * i);
+    const Eigen::Vector3d g = gains.segment<3>(row);
+    const double ss = std::max(0.0, sums.ss[s] - weight[i] * g.squaredNorm());
+    const double sr = sums.sr[s] - weight[i] * g.dot(data.segment<3>(row));
+    const double variance = spread * spread / (1 + spread * spread * ss);
+    foreseen.left[i] -= variance * sr * of_gain(study.trials[i]);
+    foreseen.unknown.push_back(variance);
+  }
+  return foreseen;
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> beside_session_gains(const Study& study,
+                                                  const std::vector<Eigen::Vector3d>& residuals,
+                                                  const SpreadFit& fit) {
+  return foreseen_gains(study, residuals, fit.estimates[0].value).left;
+}
+
+std::vector<double> scores_with_session_gains(const Study& study,
+                                              const std::vector<Eigen::Vector3d>& residuals,
+                                              const SpreadFit& fit, double outlier_share) {
+  const ForeseenGains foreseen = foreseen_gains(study, residuals, fit.estimates[0].value);
   std::vector<double> scores(study.size());
   for (std::size_t s = 0; s < study.sessions; ++s) {
     std::vector<std::size_t> own;
-    double unknown = 0;  // variance of the gain, on average over its trials
+    double unknown = 0;
+    std::vector<ResidualTrial> trials;
+    std::vector<Eigen::Vector3d> missed;
     for (std::size_t i = 0; i < study.size(); ++i) {
       if (study.trials[i].session != s) continue;
       own.push_back(i);
-      const auto row = static_cast<Eigen::Index>(3 * i);
-      const Eigen::Vector3d g = gains.segment<3>(row);
-      const double ss = std::max(0.0, sums.ss[s] - weight[i] * g.squaredNorm());
-      const double sr = sums.sr[s] - weight[i] * g.dot(data.segment<3>(row));
-      const double variance = spread * spread / (1 + spread * spread * ss);
-      left[i] -= variance * sr * of_gain(study.trials[i]);
-      unknown += variance;
+      unknown += foreseen.unknown[i];
+      trials.push_back(study.trials[i]);
+      missed.push_back(foreseen.left[i]);
     }
     if (own.empty()) continue;
     NoiseEstimate noise = study.predictive_noise();
     noise.drive_common =
         std::hypot(noise.drive_common, std::sqrt(unknown / static_cast<double>(own.size())));
-    std::vector<ResidualTrial> trials;
-    std::vector<Eigen::Vector3d> missed;
-    for (const std::size_t i : own) {
-      trials.push_back(study.trials[i]);
-      missed.push_back(left[i]);
-    }
     const std::vector<double> of_session =
         predictive_scores(trials, missed, noise, *study.subject, outlier_share);
     for (std::size_t k = 0; k < own.size(); ++k) scores[own[k]] = of_session[k];

@@ -42,14 +42,19 @@ struct SpreadRow {
   // Each session has a gain of its own, which no statement about means may use, rather
   // than trials that show nothing of means.
   bool by_session = false;
+  // Residuals with the effect foreseen, by which others are judged beside it; null: as they are.
+  std::vector<Eigen::Vector3d> (*rest)(const Study& study,
+                                       const std::vector<Eigen::Vector3d>& residuals,
+                                       const SpreadFit& fit) = nullptr;
 };
 
 // What was found in readings, single trials or sessions rather than in the mean of all drives.
 struct FoundSpread {
   std::string effect;
   SpreadFit fit;
-  const SpreadRow* row = nullptr;   // how it is looked for; null: by a step of its own
-  std::vector<double> scores = {};  // held out, one a trial, of the last fit and the effect
+  const SpreadRow* row = nullptr;  // how it is looked for; null: by a step of its own
+  // Held out, one a trial: of the last fit, what was found before and the effect; of that by it.
+  std::vector<double> scores = {}, gained = {};
 };
 
 // The sessions' gains are drawn from a Gaussian about the base's speed.  Its standard deviation is
@@ -74,6 +79,11 @@ void bend_by_session_gains(const std::vector<SessionGain>& sessions, Study* stud
 std::vector<double> scores_with_session_gains(const Study& study,
                                               const std::vector<Eigen::Vector3d>& residuals,
                                               const SpreadFit& fit, double outlier_share);
+
+// What of the residuals these other trials do not foresee.
+std::vector<Eigen::Vector3d> beside_session_gains(const Study& study,
+                                                  const std::vector<Eigen::Vector3d>& residuals,
+                                                  const SpreadFit& fit);
 
 // Whitened columns of prior standard deviation 1, one a session: what gains of that spread do.
 Eigen::MatrixXd session_columns(const Study& study, double spread);

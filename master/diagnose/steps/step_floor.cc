@@ -72,7 +72,8 @@ Judgement with_spreads_foreseen(const DiagnosisRequest& of, Judgement judged, co
                                 const std::vector<std::size_t>& folds) {
   std::vector<FoundSpread>& spreads = judged.named.spreads;
   const double share = of.outlier_share();
-  const std::vector<Eigen::Vector3d> residuals = held_out_residuals(last.study, last.fit, folds);
+  std::vector<Eigen::Vector3d> residuals = held_out_residuals(last.study, last.fit, folds);
+  std::vector<double> before = last.scores;
   const SpreadRow* worthless = nullptr;
   std::erase_if(spreads, [&](FoundSpread& found) {
     if (found.row == nullptr) return false;
@@ -85,12 +86,18 @@ Judgement with_spreads_foreseen(const DiagnosisRequest& of, Judgement judged, co
     }
     found.scores = found.row->scores(last.study, residuals, found.fit, share);
     // Where few trials are struck it is what each gains that shows, not how many do.
-    const double gained =
-        (mean(found.scores) - mean(last.scores)) * static_cast<double>(found.scores.size());
-    if (!found.row->after_means && gained >= found.row->least_gain) return false;
-    if (clearly_better(found.scores, last.scores)) return false;
-    worthless = found.row;
-    return true;
+    found.gained = gains_over(found.scores, before);
+    const double all = mean(found.gained) * static_cast<double>(found.gained.size());
+    if ((found.row->after_means || all < found.row->least_gain) &&
+        !gains_significantly(found.gained)) {
+      worthless = found.row;
+      return true;
+    }
+    if (found.row->rest != nullptr) {
+      residuals = found.row->rest(last.study, residuals, found.fit);
+      before = found.scores;
+    }
+    return false;
   });
   if (worthless == nullptr) return judged;
   return with_other_outliers(
@@ -121,6 +128,13 @@ double within_reach(const Refit& refit) {
 }
 
 }  // namespace
+
+const std::vector<double>& scores_with_all(const Refit& refit) {
+  const auto& spreads = refit.judged.named.spreads;
+  const auto last = std::find_if(spreads.rbegin(), spreads.rend(),
+                                 [](const FoundSpread& s) { return !s.scores.empty(); });
+  return last == spreads.rend() ? refit.nested.back().scores : last->scores;
+}
 
 Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std::size_t>& folds) {
   Judgement& judged = refit.judged;

@@ -83,14 +83,7 @@ bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value
 }
 
 // Of what a perfect prediction would score, nats a trial.
-double gap_left(const Refit& refit) {
-  // Means alone predict no session's gain.
-  const auto& spreads = refit.judged.named.spreads;
-  const auto sessions = std::ranges::find_if(
-      spreads, [](const FoundSpread& s) { return s.row != nullptr && s.row->by_session; });
-  return refit.floor -
-         mean(sessions != spreads.end() ? sessions->scores : refit.nested.back().scores);
-}
+double gap_left(const Refit& refit) { return refit.floor - mean(scores_with_all(refit)); }
 
 }  // namespace
 

@@ -108,6 +108,9 @@ void score(const DiagnosisRequest& of, const std::vector<std::size_t>& folds, Ne
 // not help with that is dropped.
 Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std::size_t>& folds);
 
+// Held out, one a trial: of the last model with everything that is named foreseen.
+const std::vector<double>& scores_with_all(const Refit& refit);
+
 // What is known of trials that may be outliers, one entry a trial.
 struct OutlierLesson {
   std::vector<Pose> ends;  // predicted

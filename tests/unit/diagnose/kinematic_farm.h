@@ -46,9 +46,12 @@ class KinematicFarm : public AnsweringFarm {
     return result;
   }
 
-  // As the robot goes: at once, and at one speed.
+  // As the robot goes: at once, and at one speed, or a side of its own.
   static Twist motion_of(const ParameterValues& values, double left, double right, double time_s) {
     const double speed = values[row_of(Srv1::kFullSpeed)];
+    const double apart = values[srv1_table().row("motor_asymmetry.ratio")] / 2;
+    left *= 1 - apart;
+    right *= 1 + apart;
     const double width = values[row_of(Srv1::kTrackGauge)] + values[row_of(Srv1::kContactLength)];
     return {speed * (left + right) / 2 * time_s, 0, speed * (right - left) / width * time_s};
   }

@@ -51,24 +51,28 @@ TEST(Outliers, AFewStartsThatWereFarOffAreNamed) {
       << result->diagnosis.headline << listed(result->diagnosis.cautions);
 }
 
+// The left side slips now and then, and loses up to 40 % of its speed; chains stay chains.
+void let_slip(Problem* problem) {
+  Stream stream({.run_seed = 6, .purpose = Purpose::kTest});
+  std::vector<Trial>& trials = problem->log.trials;
+  const double speed = problem->values[row_of(Srv1::kFullSpeed)];
+  const double width_m =
+      problem->values[row_of(Srv1::kTrackGauge)] + problem->values[row_of(Srv1::kContactLength)];
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const CommandSpec c = resolved_command(trials[i], problem->commands);
+    Twist mode = log(between(trials[i].X_WS, trials[i].X_WE));
+    if (i % kChain != 0) trials[i].X_WS = trials[i - 1].X_WE;
+    if (stream.bernoulli(0.15)) {
+      const double lost_m = 0.4 * stream.uniform() * c.left * c.duration_s * speed;
+      mode += Twist(-lost_m / 2, 0, lost_m / width_m);
+    }
+    trials[i].X_WE = trials[i].X_WS * exp(mode);
+  }
+}
+
 TEST(Outliers, SlipsThatWereHeldOutAreNotNothing) {
   Problem problem = chained_log(360);
-  Stream stream({.run_seed = 6, .purpose = Purpose::kTest});
-  std::vector<Trial>& trials = problem.log.trials;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    const Pose X_SE = between(trials[i].X_WS, trials[i].X_WE);
-    if (i % kChain != 0) trials[i].X_WS = trials[i - 1].X_WE;
-    const CommandSpec c = resolved_command(trials[i], problem.commands);
-    Pose slipped = X_SE;
-    if (stream.bernoulli(0.15)) {
-      const double lost_m =
-          0.4 * stream.uniform() * c.left * c.duration_s * problem.values[row_of(Srv1::kFullSpeed)];
-      const double width_m =
-          problem.values[row_of(Srv1::kTrackGauge)] + problem.values[row_of(Srv1::kContactLength)];
-      slipped = X_SE * Pose{-lost_m / 2, 0, lost_m / width_m};
-    }
-    trials[i].X_WE = trials[i].X_WS * slipped;
-  }
+  let_slip(&problem);
   KinematicFarm farm;
   DiagnoseOptions options;
   options.excluded = {"slip_events"};
@@ -78,6 +82,25 @@ TEST(Outliers, SlipsThatWereHeldOutAreNotNothing) {
   EXPECT_TRUE(result->diagnosis.effects.empty());
   EXPECT_NE(listed(result->diagnosis.cautions).find("Single drives are outliers"),
             std::string::npos);
+}
+
+// What sessions do to all of their drives must not hide what a few of them do.
+TEST(Outliers, SlipsAreNamedBesideSessionsOfOtherSpeeds) {
+  constexpr double kFaster[] = {-0.12, 0, 0.14};
+  Problem problem = chained_log(360);
+  std::vector<Trial>& trials = problem.log.trials;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const std::size_t session = i / 120;
+    const Twist mode = log(between(trials[i].X_WS, trials[i].X_WE));
+    trials[i].session = "s" + std::to_string(session);
+    trials[i].X_WE = trials[i].X_WS * exp(Twist((1 + kFaster[session]) * mode));
+  }
+  let_slip(&problem);
+  KinematicFarm farm;
+  const auto result = diagnose(farm, problem, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_EQ(names(result->diagnosis), (std::vector<std::string>{"session_gain", "slip_events"}))
+      << result->diagnosis.headline << listed(result->diagnosis.cautions);
 }
 
 // Positions that are turned as a whole look, from a line near the edge of where trials were, like
