@@ -242,14 +242,15 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
   reference.values = fit.values;
   reference.origin_m = fitter.origin_m();
   reference.windows = fitter.ended_windows(fit);
-  reference.draws = fitter.draws(fit, seed, /*all=*/alone).colwise() - fit.values;
+  const Eigen::MatrixXd all = fitter.draws(fit, seed, /*all=*/true).colwise() - fit.values;
+  reference.shown =
+      shown_rows(fit, all.rowwise().norm() / std::sqrt(static_cast<double>(all.cols())));
+  reference.draws = alone ? all : fitter.draws(fit, seed).colwise() - fit.values;
   if (const Eigen::Index grip = row_index(fit.rows, "grip"); grip >= 0) {
     const double unsure = unsure_grip(fitter, fit, grip);
     Stream stream({seed, Purpose::kStatistics, 2, 0, 0});
     for (double& off : reference.draws.row(grip)) off += unsure * stream.normal();
   }
-  const auto draws = static_cast<double>(reference.draws.cols());
-  reference.shown = shown_rows(fit, reference.draws.rowwise().norm() / std::sqrt(draws));
   reference.covariance =
       reference.draws * reference.draws.transpose() / static_cast<double>(reference.draws.cols());
   return reference;

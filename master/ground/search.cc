@@ -67,7 +67,7 @@ double least_gain(const GroundSearch& search) {
   // A long log is sure of the smallest of differences, which no model has right.
   const double stretches = search.windows.stretches();
   double least = std::max(kLeastChangeGain, 3 * stretches * std::log(kChangeShrinks));
-  if (!search.steps.empty()) least = std::max(least, kShareOfFirst * search.steps.front().gain);
+  if (!search.steps.empty()) least = std::max(least, kTraceShare * search.steps.front().gain);
   return least;
 }
 

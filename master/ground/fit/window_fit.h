@@ -56,6 +56,8 @@ struct GroundReference : Kinematics {
 
   // With its values where there are none.
   void complete(Kinematics* at) const;
+  // Whether its log does not know a row that it has.
+  bool leaves_open(const std::string& name) const;
 };
 
 struct WindowFit {

@@ -172,6 +172,35 @@ TEST(WhatChanged, GivesASkidSteersMultiplierBeforeAndAfter) {
   EXPECT_NEAR(found.corrected.controller.wheel_separation_multiplier, 1.76, 0.02);
 }
 
+// One side's wheels and the distance between the sides: neither stands for the other.
+TEST(WhatChanged, NamesTwoChanges) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const Diagnosis found = changed(robot, driven(robot, off_by({"separation"}, {1.1})),
+                                  driven(robot, off_by({"left"}, {1.05}), 5))
+                              .diagnosis;
+  ASSERT_EQ(found.effects.size(), 2u) << found.headline;
+  EXPECT_EQ(found.verdict, Verdict::kEffect);
+  const bool first = found.effects.front().name == "wheel_radius";
+  EXPECT_NEAR(found.effects[first ? 0 : 1].parameters.at(0).value, 0.05, 0.01);
+  EXPECT_NEAR(found.effects[first ? 1 : 0].parameters.at(0).value, -0.1, 0.01);
+}
+
+// Straight drives know nothing of the distance between the sides: that the file has another one is
+// no change.
+TEST(WhatChanged, SaysWhatTheReferenceDoesNotShow) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const Kinematics truly = off_by({"separation"}, {1.1});
+  RunLog straight = driven(robot, truly, 0, 1, [](double) { return 5; });
+  for (LoggedRun& run : straight.runs) {
+    for (CommandRow& row : run.commands) row.values = {5, 5};
+  }
+  const Diagnosis found = changed(robot, straight, driven(robot, truly, 5)).diagnosis;
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  EXPECT_EQ(found.headline.find("rose"), std::string::npos) << found.headline;
+  EXPECT_NE(found.headline.find("The reference does not show it"), std::string::npos)
+      << found.headline;
+}
+
 TEST(WhatChanged, RefusesAReferenceThatIsTheWrongWayRound) {
   const GroundRobot skid = robot_of(kSkid);
   RunLog before = driven(skid, {});
