@@ -72,6 +72,38 @@ TEST_F(Overwrite, NoCommandTakesAMeasuredFile) {
   EXPECT_THAT(text_of(other), HasSubstr("# log: new.csv "));
 }
 
+// What a run leaves in its folder is an output like any other.
+TEST_F(Overwrite, ANewRunReplacesNoFileInItsFolder) {
+  const std::string there = "exists already; give another name, or --force";
+  const auto run_in = [&](const std::string& out, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"evolve",        config_, "--trials",  log_, "--out", out,
+                                          "--generations", "1",     "--workers", "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  for (const char* name : {"model.toml", "report.html", "poses.svg", "fitness.svg", "log.txt"}) {
+    const std::string mine = folder_.write(std::string("of-") + name + "/" + name, "mine");
+    const std::string out = std::filesystem::path(mine).parent_path().string();
+    refused(run_in(out, {}), mine, there);
+    refused(run_in(out, {"--dry-run"}), mine, there);
+    EXPECT_FALSE(std::filesystem::exists(out + "/run.sqlite"));
+  }
+  const std::string read = "is read by this command";
+  const std::string config = folder_.write("c/model.toml", text_of(config_));
+  refused({"evolve", config, "--trials", log_, "--out", folder_ / "c", "--force"}, config, read);
+  const std::string log = folder_.write("l/report.html", text_of(log_));
+  refused({"evolve", config_, "--trials", log, "--out", folder_ / "l", "--force"}, log, read);
+  ASSERT_EQ(gapfarm_command(run_in(folder_ / "run", {})).exit_code, 0);
+  const std::string from = folder_.write("f/model.toml", text_of(folder_ / "run/model.toml"));
+  refused(run_in(folder_ / "f", {"--from", from, "--force"}), from, read);
+  refused({"resume", folder_ / "run", "--generation", "1", "--out", folder_ / "f"}, from, there);
+  const Finished forced = gapfarm_command(run_in(folder_ / "f", {"--force"}));
+  EXPECT_EQ(forced.exit_code, 0) << forced.err;
+  EXPECT_EQ(
+      gapfarm_command({"resume", folder_ / "f", "--generations", "2", "--workers", "1"}).exit_code,
+      0);
+}
+
 TEST_F(Overwrite, TheRobotsFileOfAConfigIsAnInput) {
   const std::string robot = folder_.write(
       "robot.toml",

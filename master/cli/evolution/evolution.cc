@@ -11,6 +11,8 @@
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
 #include "master/run/run.h"
+#include "master/run/run_page.h"
+#include "master/store/schema.h"
 
 namespace gapfarm {
 namespace {
@@ -126,6 +128,7 @@ void show(const RunSummary& summary, const RunStore& store, const Problem& probl
 
 void EvolutionOptions::declare(CLI::App& app) {
   declare_overrides(overrides, app);
+  outputs.declare(app);
   farm.declare(app, true);
   fleet.declare(app, "--workers-on");
   page.declare(app);
@@ -157,6 +160,26 @@ Status EvolutionOptions::complete() {
   if (farm.workers < 0) farm.workers = 0;
   if (farm.listen.empty()) {
     farm.listen = {fleet.system == "local" ? "tcp://127.0.0.1:*" : "tcp://*:*"};
+  }
+  return {};
+}
+
+Status EvolutionOptions::plan(const std::string& out, const Config& config,
+                              const std::string& from) {
+  RETURN_IF_ERROR(check_folder(out, FolderKind::kRun));
+  // RunStore::create() says that a run is there, or that no folder can be.
+  if (!is_there(out) || is_there(run_store_file(out))) return {};
+  ASSIGN_OR_RETURN(const auto stages, read_stages(config));
+  outputs.reads(config);
+  outputs.reads(from);
+  for (const auto* files : {&config.trial_files, &stages.validation_files}) {
+    for (const std::string& file : *files) outputs.reads(file);
+    outputs.reads_runs(*files);
+  }
+  std::vector<std::string> names = output_files(config.problem);
+  names.push_back("log.txt");
+  for (const std::string& name : names) {
+    RETURN_IF_ERROR(outputs.plan((std::filesystem::path(out) / name).string()));
   }
   return {};
 }

@@ -6,6 +6,7 @@
 
 #include "master/cli/evolution/fleet_options.h"
 #include "master/command/inputs.h"
+#include "master/command/outputs.h"
 #include "master/command/page_along.h"
 #include "master/run/stored_run.h"
 #include "master/store/run_store.h"
@@ -14,6 +15,7 @@ namespace gapfarm {
 
 struct EvolutionOptions {
   EvolutionOverrides overrides;
+  Outputs outputs;
   FarmOptions farm;
   FleetChoice fleet;
   PageOption page;
@@ -22,6 +24,9 @@ struct EvolutionOptions {
   void declare(CLI::App& app);
   // What --workers-on makes of the farm's options.
   Status complete();
+  // Makes sure that a new run in the folder `out` replaces nothing that is there unasked.  `from`:
+  // a file or folder that it begins at; may be empty.
+  Status plan(const std::string& out, const Config& config, const std::string& from);
 };
 
 // Of --dry-run: what the command does with these options, and what brings its workers.

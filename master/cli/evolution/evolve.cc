@@ -8,7 +8,6 @@
 #include "master/cli/evolution/search_start.h"
 #include "master/cli/subcommand.h"
 #include "master/command/long_command.h"
-#include "master/command/outputs.h"
 #include "master/run/run.h"
 #include "master/run/stored_run.h"
 
@@ -70,7 +69,7 @@ Result<int> run_evolve(EvolveCommand command, CliContext& context) {
         if (!command.from.empty())
           RETURN_IF_ERROR(begin_at(command.from, read, command.config, context.console));
         RETURN_IF_ERROR(check_farm(command.options.farm, read.farm));
-        return check_folder(command.out, FolderKind::kRun);
+        return command.options.plan(command.out, read, command.from);
       }));
   show_warnings(config.problem, config.trial_files, context.console);
   if (context.dry_run) return print_plan(command, config, context);

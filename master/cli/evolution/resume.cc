@@ -13,7 +13,6 @@
 #include "master/cli/evolution/search_start.h"
 #include "master/cli/subcommand.h"
 #include "master/command/long_command.h"
-#include "master/command/outputs.h"
 #include "master/run/run.h"
 #include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
@@ -102,7 +101,7 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
       command.options, config.farm, context);
 }
 
-Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
+Result<int> run_branch(ResumeCommand& command, CliContext& context) {
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
@@ -115,7 +114,7 @@ Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
   RETURN_IF_ERROR(check_runnable(config));
   RETURN_IF_ERROR(check_program(config, command.run));
   RETURN_IF_ERROR(check_farm(command.options.farm, config.farm));
-  RETURN_IF_ERROR(check_folder(command.out, FolderKind::kRun));
+  RETURN_IF_ERROR(command.options.plan(command.out, config, ""));
   const std::string does = "branch off " + search_start_text(run_info(config, overrides)) +
                            " into " + command.out + ", at most " +
                            std::to_string(config.evolution.generations) + " generations";
