@@ -90,7 +90,8 @@ BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
   hooks.diagnosed = [&context](std::size_t ended, std::size_t all) {
     context.work->advance(ended, all);
   };
-  hooks.on_sealed = [&context] {
+  hooks.on_sealed = [&options, &context] {
+    context.work->keeps_also("sealed and diagnosed", options.check.out);
     return context.work->keeps() ? context.work->answers().forget() : Status();
   };
   return hooks;
@@ -148,6 +149,7 @@ Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
   RETURN_IF_ERROR(LongCommand::begin(
       "blind-check", place,
       {{"find strengths", 4}, {"drive the cases", 1}, {"diagnose", 94}, {"judge", 1}}, context));
+  if (!options.foreign.empty()) context.work->keeps_also("diagnosed", settings.out);
   const BlindCheckHooks hooks = hooks_of(options, config, context);
   ASSIGN_OR_RETURN(const BlindReport report,
                    options.foreign.empty()

@@ -152,8 +152,7 @@ Status diagnose_blindly(const InHand& hand, const std::vector<Truth>& truths,
   RETURN_IF_ERROR(write_file_atomically(paths.stopped_truths(), format_sealed(hand.sealed),
                                         IfThere::kReplace, 0600));
   if (hooks.note)
-    hooks.note("stopped; the truths are in " + paths.stopped_truths() +
-               ", and the same command goes on from here");
+    hooks.note("the truths are in " + paths.stopped_truths() + " until the check goes on");
   return diagnosed;
 }
 
