@@ -29,7 +29,9 @@ Result<std::string> read_text_file(const std::string& path) {
   std::error_code code;
   const auto status = std::filesystem::status(path, code);
   if (!std::filesystem::exists(status)) {
-    return Error{path + ": no such file; check the path (it is taken from the current folder)"};
+    const std::string whole = whole_path(path);
+    return Error{path + ": no such file; check the path" +
+                 (whole == path ? "" : ", which leads to " + whole)};
   }
   if (std::filesystem::is_directory(status)) {
     const std::filesystem::path model = std::filesystem::path(path) / "model.toml";

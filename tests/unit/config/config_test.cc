@@ -11,6 +11,7 @@ namespace gapfarm::config_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -284,7 +285,11 @@ TEST(Config, NamesWhatIsNotAConfig) {
   EXPECT_THAT(error_of("drive = \"omni\"\n"), HasSubstr("found a robot's file, expected a config"));
   const auto missing = read_config("/nowhere/c.toml");
   ASSERT_FALSE(missing.ok());
-  EXPECT_THAT(missing.error().message, HasSubstr("/nowhere/c.toml: no such file"));
+  EXPECT_THAT(missing.error().message, EndsWith("/nowhere/c.toml: no such file; check the path"));
+  const auto here = read_config("nowhere/c.toml");
+  ASSERT_FALSE(here.ok());
+  EXPECT_THAT(here.error().message,
+              EndsWith("which leads to " + std::filesystem::absolute("nowhere/c.toml").string()));
 }
 
 // The files that ship with the project; a folder of the project, so it must not be empty.
