@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/base/clock.h"
+#include "common/base/text.h"
 #include "common/external/simulator.h"
 #include "common/random/stream.h"
 #include "worker/scenarios/scenario.h"
@@ -77,6 +78,12 @@ class ExternalFailure : public std::exception {
   Error error_;
 };
 
+// What to say of an answer without a motion.
+std::string refusal_of(const ExternalProgram& program, const std::string& message) {
+  return "external program '" + joined(program.command.argv, " ") + "' diverged" +
+         (message.empty() ? " and does not say why" : ": " + message);
+}
+
 ExternalSide external_side(const SideDrive& side) {
   return {side.speed_m_s, side.lag_s, side.dead_travel_m};
 }
@@ -113,7 +120,10 @@ class ExternalVehicle final : public Vehicle {
     const auto answer = ask_program(*simulator_, request_, *problem_.external, steps_);
     if (!answer) throw ExternalFailure(answer.error());
     Motion motion;
-    motion.outcome = answer->diverged ? MotionOutcome::kDiverged : MotionOutcome::kOk;
+    if (answer->diverged) {
+      motion.outcome = MotionOutcome::kDiverged;
+      motion.message = refusal_of(*problem_.external, answer->message);
+    }
     motion.X_SE = answer->X_SE;
     motion.rest_time_s = answer->rest_time_s;
     motion.duration_s = drive.duration_s + answer->rest_time_s;
@@ -165,7 +175,9 @@ class ExternalRuns final : public WindowModel {
       request.times_s = times;
       const auto answer = ask_program(*simulator_, request, *problem_.external, steps);
       if (!answer) throw ExternalFailure(answer.error());
-      return motion_of(*answer, start, times);
+      GroundMotion motion = motion_of(*answer, start, times);
+      if (answer->diverged) motion.message = refusal_of(*problem_.external, answer->message);
+      return motion;
     };
     return {{at(values, "marker.x"), at(values, "marker.y"), at(values, "marker.yaw")}, run};
   }

@@ -101,6 +101,7 @@ Prediction WindowModel::predict(const ParameterValues& values,
       if (motion.outcome != MotionOutcome::kOk) {
         prediction.outcome = to_outcome(motion.outcome);
         prediction.message = "run of session " + trial.session;
+        if (!motion.message.empty()) prediction.message += ": " + motion.message;
         prediction.trials.clear();
         return prediction;
       }

@@ -129,7 +129,9 @@ TEST_F(ExternalRunsScenario, WrongAnswersAreTheWorkersFailureAndNull) {
   EXPECT_EQ(few.outcome(), v1::WORKER_FAILED);
   EXPECT_THAT(few.message(), HasSubstr("answered 1 poses, was asked for"));
   EXPECT_EQ(failed("[[0, 0] for t in q[\"times\"]]").outcome(), v1::WORKER_FAILED);
-  EXPECT_EQ(failed("[[None, 0, 0] for t in q[\"times\"]]").outcome(), v1::DIVERGED);
+  const v1::TaskResult null = failed("[[None, 0, 0] for t in q[\"times\"]]");
+  EXPECT_EQ(null.outcome(), v1::DIVERGED);
+  EXPECT_THAT(null.message(), HasSubstr("' diverged: it answered a pose of null"));
 }
 
 TEST_F(ExternalRunsScenario, ProgramAndScenarioHaveToAgree) {

@@ -13,6 +13,7 @@
 
 namespace gapfarm::external_scenario_test {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr const char* kBridge = GAPFARM_SOURCE_DIR "/scripts/bridges/two_tracks.py";
@@ -138,7 +139,13 @@ TEST_F(ExternalScenario, WhatFailsIsTheWorkersFailureAndNamed) {
 TEST_F(ExternalScenario, ADivergedSimulationIsRankedAndBlamesNobody) {
   Config config = shell_config(R"(echo '{"id":1,"outcome":"diverged"}')");
   config.problem.log.trials = {forward(1, 1)};
-  EXPECT_EQ(predicted(config.problem).outcome(), v1::DIVERGED);
+  const v1::TaskResult silent = predicted(config.problem);
+  EXPECT_EQ(silent.outcome(), v1::DIVERGED);
+  EXPECT_THAT(silent.message(), AllOf(HasSubstr("command forward: external program '"),
+                                      HasSubstr("diverged and does not say why")));
+  Config talking = shell_config(R"(echo '{"id":1,"outcome":"diverged","message":"a wheel off"}')");
+  talking.problem.log.trials = {forward(1, 1)};
+  EXPECT_THAT(predicted(talking.problem).message(), HasSubstr("' diverged: a wheel off"));
 }
 
 TEST_F(ExternalScenario, AWorkerStartsNothingUnlessItMay) {

@@ -210,7 +210,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
 
   const auto failed_group = [&](v1::Outcome outcome, const ConditionGroup& group) {
     prediction.outcome = outcome;
-    prediction.message = "command " + problem_.commands[group.command].name;
+    prediction.message = robot.described("command " + problem_.commands[group.command].name);
     prediction.trials.clear();
     prediction.simulated_s = robot.simulated_s();
     return prediction;

@@ -81,8 +81,9 @@ class Session {
       const v1::Outcome outcome = trial(i, log->add_trials());
       if (outcome != v1::OK) {
         result.set_outcome(outcome);
-        result.set_message("trial " + std::to_string(task_.plan(i).trial().trial()) + ", command " +
-                           task_.plan(i).trial().command());
+        const v1::Trial& planned = task_.plan(i).trial();
+        result.set_message(robot_.described("trial " + std::to_string(planned.trial()) +
+                                            ", command " + planned.command()));
         break;
       }
     }
@@ -289,7 +290,12 @@ Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, co
   const Motion motion = vehicle_->run(input, floor, path, interval_s);
   simulated_s_ += motion.duration_s;
   ++runs_;
+  message_ = motion.message;
   return motion;
+}
+
+std::string Srv1Robot::described(const std::string& where) const {
+  return message_.empty() ? where : where + ": " + message_;
 }
 
 Pose pose_before_end(const std::vector<MotionSample>& path, double age_s) {
@@ -321,6 +327,7 @@ v1::TaskResult trace_command(const Problem& problem, const ParameterValues& valu
   const Motion motion =
       robot.run({c.left(), c.right(), c.duration()}, {}, gains, &path, task.interval());
   result.set_outcome(to_outcome(motion.outcome));
+  result.set_message(motion.message);
   result.set_simulated(motion.duration_s);
   v1::TraceResult* trace = result.mutable_trace();
   trace->set_rest_time(motion.rest_time_s);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "common/parameters/table.h"
@@ -87,6 +88,8 @@ class Srv1Robot {
   // Motions that the memo had count like others.
   double simulated_s() const { return simulated_s_; }
   unsigned runs() const { return runs_; }
+  // `where`, with what the last motion says of why it did not end well.
+  std::string described(const std::string& where) const;
 
  private:
   ActiveEffects effects_;
@@ -95,6 +98,7 @@ class Srv1Robot {
   std::unique_ptr<Vehicle> vehicle_;
   double simulated_s_ = 0;
   unsigned runs_ = 0;
+  std::string message_;  // of the last motion
 };
 
 SimSettings sim_settings(const RobotSize& size, const ParameterValues& values,

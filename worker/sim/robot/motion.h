@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <string>
 
 #include "common/base/constants.h"
 #include "common/pose/pose.h"
@@ -97,6 +98,7 @@ struct MotionSample {
 
 struct Motion {
   MotionOutcome outcome = MotionOutcome::kOk;
+  std::string message;     // why it did not end well, of who says so
   Pose X_SE;               // end pose of the tread centre, start frame; the heading is unwrapped
                            // by nothing: it lies in (-pi, pi]
   double rest_time_s = 0;  // from the motors' stop to rest
