@@ -99,14 +99,17 @@ class LongCommand::Asked : public RecordedFarm {
 
 Status LongCommand::begin(const std::string& command, const KeepingPlace& place,
                           std::vector<ProgressStage> stages, CliContext& context) {
-  context.begun = true;
-  if (context.stop.requested()) return stop_requested();
+  if (context.stop.requested()) {
+    context.begun = true;
+    return stop_requested();
+  }
   std::error_code code;
   fs::create_directories(place.folder, code);
   if (code) return Error{place.folder.string() + ": cannot make the folder: " + code.message()};
   ASSIGN_OR_RETURN(auto lock, RunLock::take(place.folder));
   ASSIGN_OR_RETURN(auto answers,
                    AnswerStore::open(answer_file(place.folder), build_info().fingerprint));
+  context.begun = true;  // a folder that is in the way is found before any work
   ASSIGN_OR_RETURN(const std::int64_t at_hand, answers.count());
   auto work = std::make_shared<LongCommand>(command, std::move(stages), context.console);
   work->place_ = place;

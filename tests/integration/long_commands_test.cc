@@ -201,7 +201,9 @@ TEST_F(LongCommands, StatusShowsThemLiveAndDead) {
   RunningProgram again("gapfarm", arguments);
   ASSERT_TRUE(wait_until([&] { return status()["state"] == "running"; }));
   again.send(SIGSTOP);
-  EXPECT_THAT(gapfarm_command(arguments).err, HasSubstr("in use by process"));
+  const Finished second = gapfarm_command(arguments);
+  EXPECT_THAT(second.err, HasSubstr("in use by process"));
+  EXPECT_EQ(second.exit_code, 2);
   again.send(SIGINT);
   again.send(SIGCONT);
   EXPECT_EQ(again.wait().exit_code, kStopped);
