@@ -9,6 +9,7 @@
 #include "common/base/text.h"
 #include "common/external/line_json.h"
 #include "common/json/json.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {
@@ -209,6 +210,18 @@ Json poses_of(const Json& json, const char* key, Answer* answer) {
   return given;
 }
 
+// The bounds of a log's reader.
+Status check_near(const Pose& X_SE) {
+  for (const double coordinate : {X_SE.x, X_SE.y}) {
+    if (std::abs(coordinate) <= kGreatestCoordinate_m) continue;
+    return Error{
+        formatted("answered a coordinate of %g m, expected one in [%g, %g] m; answer "
+                  "metres, and null where the simulation diverged",
+                  coordinate, -kGreatestCoordinate_m, kGreatestCoordinate_m)};
+  }
+  return {};
+}
+
 // An objective's answer; what is not finite is null here.
 Result<ExternalAnswer> read_value(const Json& json, const std::vector<std::string>& objectives,
                                   const std::string& not_a_number, const std::string& line) {
@@ -330,6 +343,7 @@ Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalReque
   if (pose.empty())
     return wrong("did not answer with \"pose\": [x, y, theta] of finite numbers", line);
   answer.X_SE = {pose[0], pose[1], wrap_angle(pose[2])};
+  RETURN_IF_ERROR(check_near(answer.X_SE));
   answer.rest_time_s = number_of(json, "rest", 0);
   if (!(answer.rest_time_s >= 0)) return wrong("answered a \"rest\" that is no time", line);
   if (request.interval_s == 0) return answer;
@@ -339,6 +353,7 @@ Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalReque
     if (s.empty() || !later)
       return wrong("answered a path that is no list of [t, x, y, theta]", line);
     answer.path.push_back({s[0], {s[1], s[2], wrap_angle(s[3])}});
+    RETURN_IF_ERROR(check_near(answer.path.back().X_SB));
   }
   if (answer.path.empty()) return wrong("was asked for a path and answered none", line);
   return answer;

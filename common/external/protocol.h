@@ -97,9 +97,9 @@ Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCom
                                                                      bool objective);
 
 std::string request_line(const ExternalRequest& request);
-// Errors: no JSON, the answer to another question, no pose, numbers that are not finite, a path
-// that was asked for and is not there.  An objective's number that is not finite is no error: it
-// has no value.
+// Errors: no JSON, the answer to another question, no pose, numbers that are not finite, a place
+// farther than kGreatestCoordinate_m, a path that was asked for and is not there.  An objective's
+// number that is not finite is no error: it has no value.
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request);
 std::string request_line(const ExternalRunRequest& request);
 // Errors: as above; not a pose a time.

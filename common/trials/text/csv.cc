@@ -16,8 +16,6 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr double kAngleTolerance = 1e-6;  // logs print pi with six digits or so, rounded up
-// An arena is metres wide; a greater number is a unit mistake that would upset every estimate.
-constexpr double kGreatestCoordinate = 1e4;
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
@@ -351,7 +349,7 @@ std::optional<double> CsvRowReader::optional_number(std::size_t column, double l
 }
 
 double CsvRowReader::coordinate(std::size_t column) {
-  return number(column, -kGreatestCoordinate, kGreatestCoordinate, "m");
+  return number(column, -kGreatestCoordinate_m, kGreatestCoordinate_m, "m");
 }
 
 double CsvRowReader::angle(std::size_t column) {

@@ -19,6 +19,10 @@ struct TextPlace {
   std::size_t column = 1;
 };
 
+// Of a pose, either way: an arena is metres wide, and a greater number is a unit mistake that would
+// upset every estimate.
+inline constexpr double kGreatestCoordinate_m = 1e4;
+
 // "file:line:column: found FOUND, expected EXPECTED; REMEDY"; an empty remedy is omitted.
 Error text_error(std::string_view file, TextPlace place, std::string_view found,
                  std::string_view expected, std::string_view remedy = {});

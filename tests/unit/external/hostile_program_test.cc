@@ -171,6 +171,12 @@ TEST(ExternalSimulator, NamesAnswersThatAreNone) {
         AllOf(HasSubstr(std::string(number) + ", which is no number"), HasSubstr("print null")));
   }
   EXPECT_THAT(message(R"({"id": 1, "pose": [0, 0, 0]})", 0.1), HasSubstr("answered none"));
+  for (const char* far : {R"({"id": 1, "pose": [0, -1e300, 0]})",
+                          R"({"id": 1, "pose": [0, 0, 0], "path": [[0, 10001, 0, 0]]})"}) {
+    EXPECT_THAT(message(far, 0.1),
+                AllOf(HasSubstr("external program '"), HasSubstr("expected one in [-10000, 10000]"),
+                      HasSubstr("by hand: ")));
+  }
   EXPECT_THAT(message(R"({"id": 1, "outcome": "tired"})"), HasSubstr("other than ok or diverged"));
 }
 
