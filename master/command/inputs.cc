@@ -257,9 +257,11 @@ std::vector<SanityFinding> log_warnings(const Problem& problem,
 void show_warnings(const Problem& problem, const std::vector<std::string>& runs, Console& console) {
   std::vector<std::size_t> impossible;
   for (const SanityFinding& f : log_warnings(problem, runs, &impossible)) {
-    // Few trials are enough to tune by; notes count where they are about rows.
-    if (f.name == "too_few_trials" || (f.severity == Severity::kNote && impossible.empty()))
-      continue;
+    // Few trials are enough to tune by unless their poses are fewer numbers than the genes; notes
+    // count where they are about rows.
+    const bool enough = 3 * problem.log.trials.size() >= problem.genes.size();
+    const bool note = f.severity == Severity::kNote && impossible.empty();
+    if (note || (f.name == "too_few_trials" && enough)) continue;
     console.note(f.name + ": " + f.text + " " + f.remedy);
   }
 }

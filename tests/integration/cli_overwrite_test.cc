@@ -182,6 +182,25 @@ TEST_F(Overwrite, LogsReportWhatWasRead) {
   EXPECT_THAT(named.err, Not(HasSubstr("not read")));
 }
 
+// One trial is three numbers.
+TEST_F(Overwrite, ATuningOfMoreGenesThanNumbersIsWarnedOf) {
+  const std::string one = folder_.write(
+      "one.csv",
+      "session,trial,t,command,left,right,duration,x0,y0,theta0,x1,y1,theta1\n" + row("a", 0));
+  const std::string many = folder_.write("many.toml",
+                                         "[genes]\nfull_speed = [0.1, 0.6]\nfriction = [0.1, 1.5]\n"
+                                         "pose_noise_position = [0.0005, 0.03]\n"
+                                         "pose_noise_heading = [0.002, 0.15]\n");
+  const auto said = [&](const std::string& config, const std::string& log) {
+    return gapfarm_command(
+               {"evolve", config, "--trials", log, "--out", folder_ / "none", "--dry-run"})
+        .err;
+  };
+  EXPECT_THAT(said(many, one), HasSubstr("too_few_trials: There is one trial"));
+  EXPECT_THAT(said(many, log_), Not(HasSubstr("too_few_trials")));
+  EXPECT_THAT(said(config_, one), Not(HasSubstr("too_few_trials")));
+}
+
 TEST_F(Overwrite, RowsWithMistakesAreListedAndHeldOutWhenAsked) {
   const std::string bad = folder_.write(
       "bad.csv", text_of(log_) + "a,2,,forward,,,,0,0,0,nan,0,0\na,3,,foward,,,,0,0,0,0,0,0\n");
