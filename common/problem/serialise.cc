@@ -12,6 +12,7 @@
 #include "common/base/text.h"
 #include "common/problem/message_parts.h"
 #include "common/problem/problem.h"
+#include "common/trials/read.h"
 #include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
@@ -104,9 +105,9 @@ Status check_tip(const Trial& trial, bool wanted, const std::string& where) {
     }
   }
   const double lasts_s = trial.tip.back().t_s - trial.tip.front().t_s;
-  if (lasts_s <= 120) return {};
-  return invalid(where + ": the finger's way takes " + std::to_string(lasts_s) +
-                 " s, expected up to 120 s; t is in s");
+  if (lasts_s <= kLongestFingersWay_s) return {};
+  return invalid(where + ": the finger's way takes " + formatted("%g", lasts_s) +
+                 " s, expected up to " + formatted("%g", kLongestFingersWay_s) + " s; t is in s");
 }
 
 // A robot, where the scenario has one.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
@@ -114,15 +115,22 @@ void add_file(const std::string& file, const std::vector<Part*>& parts, AddSampl
   add(*text, file, logs, mistakes);
 }
 
-// A push whose finger's way nobody knows is a row with a mistake.
+// A push whose finger's way nobody knows, or that takes minutes, is a row with a mistake.
 void drop_without_tips(Part& part, const std::string& tips, Mistakes& mistakes) {
   constexpr std::size_t kFewestSamples = 2;
   const bool any = !part.log.trials.empty();
   std::erase_if(part.log.trials, [&](const Trial& trial) {
-    if (trial.tip.size() >= kFewestSamples) return false;
+    if (trial.tip.size() < kFewestSamples) {
+      mistakes.add_row({text_error(
+          part.file, {trial.line, 1}, "a push with fewer than two samples of the finger's way",
+          "all of it in " + tips, "add the rows of its session and trial there, or remove it")});
+      return true;
+    }
+    if (trial.tip.back().t_s - trial.tip.front().t_s <= kLongestFingersWay_s) return false;
     mistakes.add_row({text_error(
-        part.file, {trial.line, 1}, "a push with fewer than two samples of the finger's way",
-        "all of it in " + tips, "add the rows of its session and trial there, or remove it")});
+        part.file, {trial.line, 1},
+        "a push whose finger's way takes more than " + formatted("%g s", kLongestFingersWay_s),
+        "t in s in " + tips, "divide it by 1000 if it is in ms")});
     return true;
   });
   if (any && part.log.trials.empty()) mistakes.add_no_row(part.file);

@@ -30,6 +30,9 @@ Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
                               std::span<const std::string> commands,
                               const ReadOptions& options = {});
 
+// Of a push, from its first sample to its last.
+inline constexpr double kLongestFingersWay_s = 120;
+
 // Several files as one log, in the order given; each may be a trials.csv, a pushes.csv (with the
 // tips.csv beside it) or a bbautotune run, distinguished by content.  A session split over files is
 // put together in trial order.  Errors beside the formats' own: no files, a (session, trial) in two

@@ -91,6 +91,16 @@ TEST(PushLog, APushWithoutItsTipsIsARowWithAMistake) {
   EXPECT_EQ(rest->notes.size(), 2u);
 }
 
+TEST(PushLog, APushOfMinutesIsARowWithAMistake) {
+  const TemporaryFolder folder;
+  const std::string pushes = folder.write("pushes.csv", kTwoPushes);
+  folder.write("tips.csv", "session,trial,t,x,y\na,0,0,0,0\na,0,1,0,1\na,1,0,0,0\na,1,2000,0,1\n");
+  const auto log = read_trial_files({{pushes}}, kPieces);
+  ASSERT_FALSE(log.ok());
+  EXPECT_THAT(log.error().message,
+              HasSubstr("pushes.csv:3:1: found a push whose finger's way takes more than 120 s"));
+}
+
 TEST(PushLog, TipsMustIncreaseInTime) {
   auto log = parse_pushes(kTwoPushes, "pushes.csv", kPieces);
   const Status status =
