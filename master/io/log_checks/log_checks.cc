@@ -19,6 +19,7 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"heading_flipped", "headings count clockwise"},
       {"heading_turned", "headings are counted from another axis"},
       {"sides_swapped", "left and right are exchanged"},
+      {"pieces_swapped", "two pieces' names are exchanged"},
       {kEndsSwapped, "before and after are exchanged"},
       {"direction_reversed", "the motors run backward"},
       {"commands_unrelated", "commands and motions do not belong together"},

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -25,6 +27,7 @@ double reach_of(const Piece& piece) {
 // aspect is 5 % off makes 0.05, pieces or pushes that are exchanged 0.03.
 constexpr double kTouches = 0.01, kApart = 0.03;
 constexpr double kTimesAsNear = 3;  // put right
+constexpr double kAsWell = 1.1;     // of what two readings leave
 // Of the reach, of half of the pushes: a unit 2.54 times the right one leaves some 0.5.
 constexpr double kMeets = 0.1;
 
@@ -84,12 +87,19 @@ constexpr PoseFault kPoseFaults[] = {
 struct LogReading {
   const PoseFault* fault = nullptr;
   bool exchanged = false;  // before and after
+  bool mirrored = false;   // the finger's way
   double piece_metres = 1, tip_metres = 1;
+  const Piece *one = nullptr, *other = nullptr;  // whose names are exchanged
+
+  const Piece& piece(const Problem& problem, const Trial& t) const {
+    const Piece& named = problem.piece(t.command);
+    return &named == one ? *other : &named == other ? *one : named;
+  }
 
   Pose start(const Trial& t) const { return pose(exchanged ? t.X_WE : t.X_WS); }
   Pose end(const Trial& t) const { return pose(exchanged ? t.X_WS : t.X_WE); }
   Eigen::Vector2d point(const TipSample& tip) const {
-    return {tip_metres * tip.x, tip_metres * tip.y};
+    return {tip_metres * tip.x, (mirrored ? -tip_metres : tip_metres) * tip.y};
   }
 
  private:
@@ -101,7 +111,7 @@ struct LogReading {
 
 // How far the finger stays off the outline at its start; below 0: it goes into it.
 double nearest_gap(const Problem& problem, const Trial& t, const LogReading& as) {
-  const Piece& piece = problem.piece(t.command);
+  const Piece& piece = as.piece(problem, t);
   double nearest = INFINITY;
   for (const TipSample& tip : t.tip) {
     nearest = std::min(nearest, outside(as.point(tip), piece, as.start(t)));
@@ -120,7 +130,7 @@ double misfit(const Problem& problem, const LogReading& as) {
   double sum = 0, count = 0;
   for (const Trial& t : problem.log.trials) {
     if (t.tip.empty()) continue;
-    const Piece& piece = problem.piece(t.command);
+    const Piece& piece = as.piece(problem, t);
     const Pose X_WS = as.start(t), X_WE = as.end(t);
     const auto depth = [&](const TipSample& tip, const Pose& X) {
       return std::max(0.0, finger_m - outside(as.point(tip), piece, X));
@@ -143,7 +153,7 @@ double misses(const Problem& problem, const LogReading& as, double reach_m) {
     double nearest = INFINITY, way = 0;
     for (const TipSample& s : t.tip) {
       way = std::max(way, std::hypot(s.x - t.tip.front().x, s.y - t.tip.front().y));
-      nearest = std::min(nearest, outside(as.point(s), problem.piece(t.command), X_WE));
+      nearest = std::min(nearest, outside(as.point(s), as.piece(problem, t), X_WE));
     }
     off.push_back(std::abs(nearest - finger_m));
     ways.push_back(as.tip_metres * way);
@@ -153,30 +163,52 @@ double misses(const Problem& problem, const LogReading& as, double reach_m) {
 
 // How finger and outlines do not fit; nothing where they do.
 std::optional<SanityFinding> check_outlines(const Problem& problem, double reach_m) {
-  const double before_m = misfit(problem, {});
-  if (before_m < kTouches * reach_m) return std::nullopt;
+  const double before_m = misfit(problem, {}), missed_m = misses(problem, {}, reach_m);
+  const bool touches = before_m < kTouches * reach_m;
+  if (touches && missed_m < kMeets * reach_m) return std::nullopt;
   SanityFinding found = {
       "frames_apart",
       "Finger and outlines miss or overlap one another by " + few_digits(1000 * before_m) +
-          " mm a push.",
+          " mm a push" +
+          (std::isfinite(missed_m)
+               ? ", and half of them by " + few_digits(1000 * missed_m) + " mm where they end."
+               : "."),
       "Look whether each push has its own piece, its finger's way and its poses, "
       "in one frame.",
       // A camera whose lengths are askew does as much.
       Severity::kNote};
   const std::string seen = found.text;
-  double after_m = before_m / kTimesAsNear;
-  const auto take = [&](const LogReading& as, const char* name, const char* text,
-                        const char* remedy) {
-    const double put_m = misfit(problem, as);
+  double least_m = INFINITY;
+  const auto take = [&](const LogReading& as, const char* name, const std::string& text,
+                        const std::string& remedy) {
+    const double put_m = misfit(problem, as), misses_m = misses(problem, as, reach_m);
     // A finger that stands still or goes elsewhere fits outlines that are put out of its way.
-    if (put_m >= after_m || misses(problem, as, reach_m) >= kMeets * reach_m) return;
-    after_m = put_m;
-    found = {name, seen + " Put right, by " + few_digits(1000 * put_m) + " mm. " + text, remedy};
+    if (misses_m >= kMeets * reach_m || (touches && misses_m >= missed_m / kTimesAsNear)) return;
+    if (put_m >= std::max(before_m, kTouches * reach_m) / kTimesAsNear) return;
+    const double left_m = put_m + misses_m;
+    const bool as_good = left_m <= kAsWell * least_m && least_m <= kAsWell * left_m;
+    if (as_good) found.remedy += " Or else: " + text + " " + remedy;
+    if (as_good || left_m >= least_m) return;
+    least_m = left_m;
+    found = {name,
+             seen + " Put right, by " + few_digits(1000 * put_m) + " and " +
+                 few_digits(1000 * misses_m) + " mm. " + text,
+             remedy};
   };
   for (const PoseFault& fault : kPoseFaults) {
     take({.fault = &fault}, fault.name, fault.text, fault.remedy);
   }
+  take({.fault = &kPoseFaults[0], .mirrored = true}, "axis_mirrored",
+       "The frame of pieces and finger is mirrored.",
+       "Negate y and theta of the pieces and y of the finger.");
   take({.exchanged = true}, kEndsSwapped, "Before and after are exchanged.", kExchangeEnds);
+  for (const Piece& one : problem.pieces) {
+    for (const Piece& other : std::span(&one, std::to_address(problem.pieces.end())).subspan(1)) {
+      take({.one = &one, .other = &other}, "pieces_swapped",
+           "The names " + one.name + " and " + other.name + " are exchanged.",
+           "Exchange these names.");
+    }
+  }
   if (found.severity == Severity::kNote && before_m < kApart * reach_m) return std::nullopt;
   return found;
 }

@@ -15,7 +15,7 @@ namespace gapfarm::push_checks_test {
 constexpr double kPi = std::numbers::pi;
 
 // From its left side, by 5 cm; nothing of it is symmetric.
-Problem pushed() {
+Problem pushed(double by_m = 0.05) {
   Problem problem;
   problem.scenario = "push";
   problem.values = problem.table().nominal();
@@ -31,8 +31,8 @@ Problem pushed() {
     t.trial = i;
     t.command = piece.name;
     t.X_WS = {stream.uniform(-1, 1), stream.uniform(-1, 1), stream.uniform(-3, 3)};
-    t.X_WE = t.X_WS * Pose{0.05, 0, 0};
-    for (double way_m = -0.02; way_m <= 0.05; way_m += 0.01) {
+    t.X_WE = t.X_WS * Pose{by_m, 0, 0};
+    for (double way_m = -0.02; way_m < by_m + 0.001; way_m += 0.01) {
       const Eigen::Vector2d tip = transform(t.X_WS, {-0.03 - finger_m + way_m, 0});
       t.tip.push_back({way_m + 0.02, tip.x(), tip.y()});
     }
@@ -134,9 +134,47 @@ TEST(PushChecks, NameHowPosesDoNotFitTheFingersWay) {
 }
 
 TEST(PushChecks, NameEndsThatAreExchanged) {
+  // By more than its own length the finger ends in neither outline.
+  for (const double by_m : {0.05, 0.2}) {
+    Problem problem = pushed(by_m);
+    EXPECT_EQ(named(problem), "") << by_m;
+    for (Trial& t : problem.log.trials) std::swap(t.X_WS, t.X_WE);
+    EXPECT_EQ(named(problem), "ends_swapped") << by_m;
+  }
+}
+
+// A camera's frame whose y points down mirrors pieces and finger alike.
+TEST(PushChecks, NameAFrameThatIsMirroredAsAWhole) {
   Problem problem = pushed();
-  for (Trial& t : problem.log.trials) std::swap(t.X_WS, t.X_WE);
-  EXPECT_EQ(named(problem), "ends_swapped");
+  for (Trial& t : problem.log.trials) {
+    for (TipSample& s : t.tip) {  // near one end of the side
+      s.x -= 0.045 * std::sin(t.X_WS.theta);
+      s.y = -(s.y + 0.045 * std::cos(t.X_WS.theta));
+    }
+    for (Pose* X : {&t.X_WS, &t.X_WE}) X->y = -X->y, X->theta = -X->theta;
+  }
+  std::vector<SanityFinding> findings;
+  check_pushes(problem, &findings);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].name, "axis_mirrored");
+  EXPECT_EQ(findings[0].remedy, "Negate y and theta of the pieces and y of the finger.");
+}
+
+TEST(PushChecks, NamePiecesWhoseNamesAreExchanged) {
+  Problem problem = pushed();
+  problem.pieces.push_back(
+      {.name = "box", .corners = {{-0.06, -0.03}, {0, -0.03}, {0, 0.03}, {-0.06, 0.03}}});
+  for (std::size_t i = 0; i < problem.log.trials.size(); i += 2) {
+    Trial& t = problem.log.trials[i];
+    t.command = "box";
+    for (TipSample& s : t.tip) {
+      s.x -= 0.03 * std::cos(t.X_WS.theta);
+      s.y -= 0.03 * std::sin(t.X_WS.theta);
+    }
+  }
+  EXPECT_EQ(named(problem), "");
+  for (Trial& t : problem.log.trials) t.command = t.command == "box" ? "wedge" : "box";
+  EXPECT_EQ(named(problem), "pieces_swapped");
 }
 
 // From 2 cm off the piece the finger goes away from it, or nowhere; a few such pushes are fine.
