@@ -247,6 +247,11 @@ constexpr WrongPoses kWrongPoses[] = {
      1, 0, true, true},
     {"heading_unit", "unit_error", "", "headings in degrees", "Multiply theta by pi / 180.", 1, 1,
      pi / 180},
+    {"heading_unit", "heading_flipped", "unit_error", "headings in degrees that count clockwise",
+     "Multiply theta by -pi / 180.", 1, 1, -pi / 180},
+    {"heading_unit", "heading_flipped", "heading_offset",
+     "headings in degrees that count clockwise from north (y)",
+     "Multiply theta by pi / 180 and take it from pi / 2.", 1, 1, -pi / 180, -pi / 2, false, true},
     // asin() of a quaternion's z.
     {"heading_unit", "unit_error", "", "headings that are half of what they should be",
      "Double theta.", 1, 1, 2},

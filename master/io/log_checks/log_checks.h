@@ -135,9 +135,12 @@ struct RunChecks {
   }
 };
 
-// Runs whose poses never change, or crawl, though the robot is commanded to drive, that move though
-// nothing is commanded, and that are another one's copy; stretches without any pose; commands that
-// are older than the robot's timeout; a gyro of another sign, unit or clock than the headings.
+void check_gyro(const RunLog& log, RunChecks* checks);
+
+// Runs whose poses never change, or crawl, though the robot is commanded to drive, or whose
+// headings alone never do though it turns, that move though nothing is commanded, and that are
+// another one's copy; stretches without any pose; commands that are older than the robot's timeout;
+// a gyro of another sign, unit or clock than the headings.
 RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s = {});
 
 // Poses that the tracker took from elsewhere, for they jump there and back.  REQUIRES: headings in
@@ -157,6 +160,7 @@ struct DriveSample {
   Pose X_WS, X_WE;
 
   double distance_m() const;
+  double turn_share() const;       // of the way; NaN where nothing was driven
   double turned_rad() const;       // wrapped
   double mid_heading_rad() const;  // half way through the turn
   double travel_rad() const;       // of the way from start to end, in the world
@@ -171,6 +175,10 @@ double full_speed_of(const std::vector<DriveSample>& samples);
 
 // Fewer straight drives say nothing.
 inline constexpr std::size_t kFewestStraight = 8;
+
+inline constexpr std::size_t kFewestTurns = 8;
+inline constexpr double kStraightShare = 0.2;  // turn over way, of what counts as straight
+inline constexpr double kOtherGauge = 1.5;     // a robot's may be so many times a config's, or less
 
 // Those that drive straight enough to follow their heading: straight ones where there are enough,
 // else gentle arcs.
@@ -202,6 +210,7 @@ void check_turning(const std::vector<DriveSample>& samples, const DriveLimits& l
 // that count clockwise, sides reported the wrong way round.
 
 // The one thing that is the wrong way round, named by Occam: none where all agree or nothing says.
-std::optional<SanityFinding> check_axes(const std::vector<DriveSample>& samples);
+std::optional<SanityFinding> check_axes(const std::vector<DriveSample>& samples,
+                                        const DriveLimits& limits);
 
 }  // namespace gapfarm

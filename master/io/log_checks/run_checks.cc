@@ -1,13 +1,14 @@
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/pose/pose.h"
-#include "common/recordings/windows.h"
 #include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
@@ -18,7 +19,9 @@ constexpr double kNoMove_m = 0.2;
 // No robot that drives is slower than both, a hundredth of its steps aside.
 constexpr double kSlow_m_s = 5e-3, kSlow_rad_s = 5e-3;
 constexpr std::size_t kFewestSteps = 10;
-constexpr double kLeastGap_s = 10;  // twice the longest windows
+constexpr double kLeastWay_s = 1;     // what is compared of a run at once
+constexpr double kUnexplained = 0.5;  // of the squared ways
+constexpr double kLeastGap_s = 10;    // twice the longest windows
 constexpr double kTimesUsualGap = 50;
 constexpr double kManyStale = 0.1;  // of the time that a robot is commanded to drive
 // Of a step, over what four in five are and over those about it: no robot gathers speed so fast.
@@ -28,12 +31,7 @@ constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;
 constexpr double kTimesAStep = 3;       // where half a turn is no more than a few of them
 constexpr std::size_t kNeighbours = 4;  // either way
 constexpr double kUsualShare = 0.8;     // of the steps are shorter: a tracker may lose some
-// A gyro's slope over headings that are in degrees, and how much of both has to be the same.
-constexpr double kDegrees = 180 / std::numbers::pi, kAlike = 0.9, kMostRatio = 1.5;
-constexpr double kClockStep_s = 0.02, kMostClock_s = 0.5, kLateClock_s = 0.06;
-// What another clock has to leave of what the headings do not explain.
-constexpr double kLeftByClock = 0.5;
-constexpr double kMostLost = 0.1;  // of a run or one pose, before the tracker found the robot
+constexpr double kMostLost = 0.1;       // of a run or one pose, before the tracker found the robot
 
 std::string name_of(const LoggedRun& run) { return "run " + run.run; }
 
@@ -47,6 +45,38 @@ bool never_moves(const LoggedRun& run) {
   return run.poses.size() > 1 && std::ranges::all_of(run.poses, [&](const PoseRow& row) {
            return row.X_WM == run.poses.front().X_WM;
          });
+}
+
+// Headings that are one number although the robot turns: where it does not, how far it goes each
+// way is its commands times a constant.
+bool never_turns_but_does(const LoggedRun& run) {
+  if (run.poses.size() < 2 || run.commands.empty()) return false;
+  const double heading = run.poses.front().X_WM.theta;
+  const auto turns = [&](const PoseRow& row) { return row.X_WM.theta != heading; };
+  if (std::ranges::any_of(run.poses, turns)) return false;
+  const auto channels = static_cast<Eigen::Index>(run.commands.front().values.size());
+  std::vector<Eigen::VectorXd> commanded;
+  std::vector<Eigen::Vector2d> ways;
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(channels);
+  auto from = run.poses.begin();
+  for (std::size_t i = 1; i < run.commands.size(); ++i) {
+    const CommandRow &held = run.commands[i - 1], &next = run.commands[i];
+    sum += (next.t_s - held.t_s) * Eigen::Map<const Eigen::VectorXd>(held.values.data(), channels);
+    const auto to = std::ranges::lower_bound(run.poses, next.t_s, {}, &PoseRow::t_s);
+    if (to == run.poses.end()) break;
+    if (to->t_s - from->t_s < kLeastWay_s) continue;
+    commanded.push_back(std::exchange(sum, Eigen::VectorXd::Zero(channels)));
+    ways.emplace_back(to->X_WM.x - from->X_WM.x, to->X_WM.y - from->X_WM.y);
+    from = to;
+  }
+  if (ways.size() < kFewestSteps) return false;
+  Eigen::MatrixXd A(ways.size(), channels), B(ways.size(), 2);
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    A.row(static_cast<Eigen::Index>(i)) = commanded[i];
+    B.row(static_cast<Eigen::Index>(i)) = ways[i];
+  }
+  const Eigen::MatrixXd left = B - A * A.colPivHouseholderQr().solve(B);
+  return left.squaredNorm() > kUnexplained * B.squaredNorm();
 }
 
 bool travels(const LoggedRun& run) {
@@ -83,7 +113,7 @@ struct Places {
 };
 
 void add_useless_runs(const RunLog& log, RunChecks* checks) {
-  Places still, driverless, slow, copies;
+  Places still, unturned, driverless, slow, copies;
   for (std::size_t r = 0; r < log.runs.size(); ++r) {
     const LoggedRun& run = log.runs[r];
     const auto is_copied = [&](std::size_t other) { return same_poses(run, log.runs[other]); };
@@ -91,6 +121,7 @@ void add_useless_runs(const RunLog& log, RunChecks* checks) {
     while (first < r && !is_copied(first)) ++first;
     Places* of = nullptr;
     if (never_moves(run) && is_commanded(run)) of = &still;
+    if (of == nullptr && travels(run) && never_turns_but_does(run)) of = &unturned;
     if (!is_commanded(run) && travels(run)) of = &driverless;
     if (of == nullptr && is_commanded(run) && is_slow(run)) of = &slow;
     if (first < r && run.poses.size() > 1 && of == nullptr) of = &copies;
@@ -107,6 +138,9 @@ void add_useless_runs(const RunLog& log, RunChecks* checks) {
   };
   report(still, "still_runs", "The poses never change, though the robot is commanded to drive: ",
          "Log these runs again: the tracker stood still, or the robot. They are omitted.");
+  report(unturned, "still_headings", "The headings never change, though the robot turns: ",
+         "Look where headings come from: qx, qy, qz, qw in another order make one. These runs are "
+         "omitted.");
   report(driverless, "uncommanded_runs", "Every command is 0, though the robot travels: ",
          "Log the commands that it was driven by. These runs are omitted.");
   report(slow, "slow_runs",
@@ -293,54 +327,6 @@ void add_stale_commands(const RunLog& log, double timeout_s, RunChecks* checks) 
        "If it drove on, log all commands; or, where the log keeps changes alone, remove "
        "cmd_vel_timeout from the robot's file.",
        Severity::kNote});
-}
-
-// How a gyro's turns go with those of the headings, its clock set back by `late_s`.
-struct GyroFit {
-  double slope = 0;  // of the gyro's over theirs
-  double alike = 0;  // their correlation
-};
-
-GyroFit fit_gyro(const RunLog& log, double late_s) {
-  double gg = 0, gh = 0, hh = 0;
-  for (const LoggedRun& run : log.runs) {
-    for (std::size_t i = 1; i < run.poses.size(); ++i) {
-      const PoseRow &a = run.poses[i - 1], &b = run.poses[i];
-      const auto g = turned_between(run.yaw_rates, a.t_s + late_s, b.t_s + late_s);
-      if (!g) continue;
-      const double h = wrap_angle(b.X_WM.theta - a.X_WM.theta);
-      gg += *g * *g, gh += *g * h, hh += h * h;
-    }
-  }
-  return gg > 0 && hh > 0 ? GyroFit{gh / hh, gh / std::sqrt(gg * hh)} : GyroFit{};
-}
-
-void check_gyro(const RunLog& log, RunChecks* checks) {
-  double late_s = 0;
-  GyroFit best = fit_gyro(log, 0);
-  const double left = 1 - best.alike * best.alike;
-  for (double s = -kMostClock_s; s <= kMostClock_s; s += kClockStep_s) {
-    const GyroFit fit = fit_gyro(log, s);
-    if (std::abs(fit.alike) <= std::abs(best.alike)) continue;
-    best = fit;
-    late_s = s;
-  }
-  const auto report = [&](const char* name, const std::string& text, const std::string& remedy) {
-    checks->gyro_is_wrong = true;
-    checks->findings.push_back({name, "The gyro's turns go with those of the headings " + text,
-                                remedy + " Its rates are omitted.", Severity::kWarning});
-  };
-  if (std::abs(best.alike) < kAlike) return;
-  if (best.slope < 0) report("gyro_sign", "the other way.", "Turn the sign of yaw_rate.");
-  const double degrees = std::abs(best.slope) / kDegrees;
-  if (degrees > 1 / kMostRatio && degrees < kMostRatio) {
-    report("gyro_unit", few_digits(std::abs(best.slope)) + " times, as degrees a second do.",
-           "Multiply yaw_rate by pi / 180.");
-  }
-  const bool explains = 1 - best.alike * best.alike < kLeftByClock * left;
-  if (std::abs(late_s) >= kLateClock_s && explains) {
-    report("gyro_clock", few_digits(late_s) + " s later.", "Take that from the gyro's times.");
-  }
 }
 
 }  // namespace

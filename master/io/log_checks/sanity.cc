@@ -73,13 +73,13 @@ std::size_t count_following(const TrialLog& log, const std::vector<DriveSample>&
 
 // check_axes(), unless the trials show that it is before and after that are the wrong way round:
 // exchanged, their axes are right and they follow one another, which as logged they do not.
-std::optional<SanityFinding> check_ways_round(const TrialLog& log,
-                                              std::vector<DriveSample> samples) {
-  auto axes = check_axes(samples);
+std::optional<SanityFinding> check_ways_round(const TrialLog& log, std::vector<DriveSample> samples,
+                                              const DriveLimits& limits) {
+  auto axes = check_axes(samples, limits);
   if (!axes) return axes;
   const std::size_t as_logged = count_following(log, samples);
   for (DriveSample& s : samples) std::swap(s.X_WS, s.X_WE);
-  if (check_axes(samples)) return axes;
+  if (check_axes(samples, limits)) return axes;
   TrialLog exchanged = log;
   for (Trial& t : exchanged.trials) std::swap(t.X_WS, t.X_WE);
   const std::size_t following = count_following(exchanged, samples);
@@ -95,13 +95,13 @@ std::optional<SanityFinding> check_ways_round(const TrialLog& log,
 
 // One session may have been mounted or wired another way round.
 void check_axes_of_sessions(const Problem& problem, const std::vector<DriveSample>& samples,
-                            std::vector<SanityFinding>* findings) {
+                            const DriveLimits& limits, std::vector<SanityFinding>* findings) {
   std::map<std::string, std::vector<DriveSample>> of_session;
   for (const DriveSample& s : samples) {
     of_session[problem.log.trials[s.trial].session].push_back(s);
   }
   for (const auto& [session, its] : of_session) {
-    auto axes = check_ways_round(problem.log, its);
+    auto axes = check_ways_round(problem.log, its, limits);
     if (!axes) continue;
     axes->text = "In session " + session + " alone: " + axes->text;
     axes->remedy = "In session " + session + " alone: " + axes->remedy;
@@ -125,13 +125,13 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
   bool suspicious = check_speed(samples, limits, findings);
   if (check_heading_unit(samples, findings)) {
     suspicious = true;
-  } else if (auto axes = check_ways_round(problem.log, samples)) {
+  } else if (auto axes = check_ways_round(problem.log, samples, limits)) {
     findings->push_back(std::move(*axes));
     suspicious = true;
   } else if (check_related(samples, findings)) {
     suspicious = true;
   } else {
-    check_axes_of_sessions(problem, samples, findings);
+    check_axes_of_sessions(problem, samples, limits, findings);
     suspicious |= !findings->empty();
   }
   if (suspicious) return;

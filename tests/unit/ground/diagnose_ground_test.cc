@@ -181,6 +181,8 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
          X.y *= 1000;
        })},
       {"heading_unit", poses([](Pose& X) { X.theta *= 180 / std::numbers::pi; })},
+      {"heading_unit",  // a compass's, in degrees
+       poses([](Pose& X) { X.theta = 90 - X.theta * 180 / std::numbers::pi; })},
       {"heading_unit", poses([](Pose& X) { X.theta /= 2; })},  // asin() of a quaternion's z
       {"unit_error", with([](LoggedRun& run) {                 // m/s of the rims
          for (CommandRow& row : run.commands) {

@@ -54,6 +54,32 @@ TEST(RunChecks, ASoundLogPasses) {
   }
 }
 
+// As a quaternion in another order has them; of a robot that does not turn they are as they should.
+TEST(RunChecks, HeadingsThatNeverChangeAreOmitted) {
+  for (const double w : {0.0, 0.8}) {
+    RunLog log = two_runs();
+    Stream stream({.run_seed = 9});
+    for (LoggedRun& run : log.runs) {
+      run.commands.clear();
+      Pose X;
+      for (PoseRow& row : run.poses) {
+        if ((&row - run.poses.data()) % 15 == 0) {
+          run.commands.push_back({row.t_s, {stream.uniform(-0.5, 0.5), w}});
+        }
+        row.X_WM = {X.x + 0.002 * stream.normal(), X.y, 0};
+        X = X * exp(0.1 * Twist(run.commands.back().values[0], 0, w));
+      }
+    }
+    const RunChecks checks = check_runs(log);
+    EXPECT_EQ(checks.none_is_left(log), w > 0);
+    if (w > 0) {
+      ASSERT_FALSE(checks.findings.empty());
+      EXPECT_EQ(checks.findings[0].name, "still_headings");
+      EXPECT_EQ(checks.findings[0].severity, Severity::kUnusable);
+    }
+  }
+}
+
 TEST(RunChecks, UselessRunsAreOmitted) {
   RunLog log = two_runs();
   for (PoseRow& row : log.runs[0].poses) row.X_WM = {1, 2, 3};

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <tuple>
@@ -280,6 +281,41 @@ TEST(Sanity, WarningsCopiesAndClocksThatRunBackward) {
 TEST(Sanity, ARobotThatTurnsFasterThanItsSidesAllowIsAnotherOne) {
   EXPECT_EQ(first_name(drawn_drives(150, {0.19, 2.5})), "robot_out_of_bounds");
   EXPECT_EQ(first_name(drawn_drives(150, {1.5, 2.5})), "robot_out_of_bounds");
+}
+
+Problem with_durations(Problem problem, const Robot& robot, double duration_s) {
+  for (Trial& t : problem.log.trials) {
+    const CommandSpec& c = *std::ranges::find(problem.commands, t.command, &CommandSpec::name);
+    t.left = c.left, t.right = c.right, t.duration_s = duration_s;
+    t.X_WE = t.X_WS * driven(robot, {"", *t.left, *t.right, duration_s});
+  }
+  return problem;
+}
+
+// All turns of one log by one angle, which is another one the other way round: how far arcs lead
+// and how fast the robot can be distinguish the two, or nothing does.
+TEST(Sanity, TakesNoLongTurnsForTurnsTheOtherWay) {
+  const Robot robot{0.28, 2};
+  for (const double duration_s : {1.0, 2.0, 4.0, 6.0, 8.0, 10.0}) {
+    Problem log = with_durations(drawn_drives(200, robot), robot, duration_s);
+    EXPECT_EQ(first_name(log), "") << duration_s;
+    for (Trial& t : log.log.trials) std::swap(t.left, t.right);
+    EXPECT_EQ(first_name(log), duration_s > 1 ? "" : "sides_swapped") << duration_s;
+    const auto of_any_gauge = check_axes(drive_samples(log), {0.005, 30, 0.4, 0});
+    if (duration_s == 1) EXPECT_EQ(of_any_gauge.value_or(SanityFinding{}).name, "sides_swapped");
+    std::erase_if(log.log.trials, [](const Trial& t) { return t.command.starts_with("wide"); });
+    EXPECT_EQ(first_name(log), duration_s > 1 ? "" : "sides_swapped") << duration_s;
+  }
+}
+
+// No unit of length makes a robot turn faster.
+TEST(Sanity, TakesNoDurationsInMinutesForLengthsInInches) {
+  Problem log = drawn_drives(150);
+  for (Trial& t : log.log.trials) *t.duration_s /= 60;
+  const auto findings = check_sanity(log);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].name, "robot_out_of_bounds");
+  EXPECT_THAT(findings[0].remedy, testing::HasSubstr("Durations or duties are too small"));
 }
 
 // One angle of turn only: 200 degrees one way may be 160 the other.
