@@ -20,7 +20,7 @@ constexpr double kClearMargin = 0.4;
 constexpr double kUnrelated = 0.3;
 constexpr double kAsGood = 0.15;    // of two agreements
 constexpr double kArc = 2;          // turn over way: beyond, what slips outweighs it
-constexpr double kSameChord = 0.3;  // of an arc's way
+constexpr double kSameChord = 0.2;  // of an arc's way, beyond the nearest
 constexpr std::size_t kManyStraight = 20;
 constexpr double kLeastShare = 0.3;  // of the typical distance: shorter ones have no direction
 // Catalogued as heading_offset up to here; beyond, an axis is another one.
@@ -71,20 +71,26 @@ int sense_of_turns(const std::vector<DriveSample>& samples, const DriveLimits& l
   const double step = 0.05 / *std::ranges::max_element(sizes);
   // It must explain most of what no turning at all leaves; where turns are small that is little.
   const double least = std::max(kGoodConcentration, 0.5 + 0.5 * agreement(turns, 0));
-  const auto best = [&](double sign) {  // agreement at any rate, rad a second of duty
-    double most = -1;
-    for (double rate = step; rate < fastest; rate += step) {
-      const double value = agreement(turns, sign * rate);
-      if (value < least || value <= most) continue;
-      if (has_speed && arcs.size() >= kFewestTurns &&
-          chord_misfit(arcs, rate, speed_m_s) > kSameChord) {
-        continue;
-      }
-      most = value;
-    }
-    return most;
+  struct Reading {
+    double sign, agreement, chord;
   };
-  const double left = best(1), right = best(-1);
+  std::vector<Reading> readings;
+  for (double rate = step; rate < fastest; rate += step) {  // rad a second of duty
+    for (const double sign : {1.0, -1.0}) {
+      const auto value_at = [&](double r) { return agreement(turns, sign * r); };
+      const double value = value_at(rate);
+      if (value < least || value < value_at(rate - step) || value < value_at(rate + step)) continue;
+      const bool curves = has_speed && arcs.size() >= kFewestTurns;
+      readings.push_back({sign, value, curves ? chord_misfit(arcs, rate, speed_m_s) : 0});
+    }
+  }
+  if (readings.empty()) return 0;
+  const double nearest = std::ranges::min(readings, {}, &Reading::chord).chord;
+  double left = -1, right = -1;
+  for (const Reading& r : readings) {
+    double& most = r.sign > 0 ? left : right;
+    if (r.chord <= nearest + kSameChord) most = std::max(most, r.agreement);
+  }
   if (std::abs(left - right) <= kAsGood) return 0;
   return left > right ? 1 : -1;
 }

@@ -300,7 +300,7 @@ TEST(Sanity, TakesNoLongTurnsForTurnsTheOtherWay) {
     Problem log = with_durations(drawn_drives(200, robot), robot, duration_s);
     EXPECT_EQ(first_name(log), "") << duration_s;
     for (Trial& t : log.log.trials) std::swap(t.left, t.right);
-    EXPECT_EQ(first_name(log), duration_s > 1 ? "" : "sides_swapped") << duration_s;
+    EXPECT_EQ(first_name(log), duration_s > 2 ? "" : "sides_swapped") << duration_s;
     const auto of_any_gauge = check_axes(drive_samples(log), {0.005, 30, 0.4, 0});
     if (duration_s == 1) EXPECT_EQ(of_any_gauge.value_or(SanityFinding{}).name, "sides_swapped");
     std::erase_if(log.log.trials, [](const Trial& t) { return t.command.starts_with("wide"); });
