@@ -3,6 +3,8 @@
 
 #include <cctype>
 #include <regex>
+#include <string_view>
+#include <utility>
 
 #include "master/io/logs/column_map.h"
 
@@ -60,6 +62,31 @@ std::string unit_in_name(const std::string& name) {
   if (from == name.npos || end == name.npos || end < from) return "";
   const std::string unit = name.substr(from + 1, end - from - 1);
   return !unit.empty() && unit_factor(unit) != 0 ? unit : "";
+}
+
+void join_times(LogTable* table) {
+  constexpr std::pair<std::string_view, const char*> kParts[] = {
+      {"sec", "nanosec"}, {"sec", "nsec"}, {"secs", "nsecs"}};
+  const std::vector<std::string> columns = table->columns;
+  for (std::size_t s = 0; s < columns.size(); ++s) {
+    for (const auto& [whole, rest] : kParts) {
+      if (!columns[s].ends_with(whole)) continue;
+      std::string name = columns[s].substr(0, columns[s].size() - whole.size());
+      const auto ns = table->find(name + rest);
+      name.erase(name.find_last_not_of("._/") + 1);
+      if (name.empty()) name = "stamp";
+      if (!ns || table->find(name)) continue;
+      std::vector<double> values;
+      for (std::size_t r = 0; r < table->rows(); ++r) {
+        for (std::size_t c = 0; c < table->columns.size(); ++c) values.push_back(table->at(r, c));
+        values.push_back(table->at(r, s) + 1e-9 * table->at(r, *ns));
+      }
+      table->values = std::move(values);
+      table->columns.push_back(name);
+      if (!table->titles.empty()) table->titles.push_back(name);
+      if (!table->units.empty()) table->units.push_back({"s", {}});
+    }
+  }
 }
 
 std::vector<std::string> sides_of(const LogTable& table) {

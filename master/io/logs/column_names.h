@@ -26,4 +26,9 @@ std::string unit_in_name(const std::string& name);
 // Two columns whose names differ by the side, left first; empty: there are none.
 std::vector<std::string> sides_of(const LogTable& table);
 
+// Adds a column for each two of which one has whole seconds and the other what goes beyond them, in
+// ns, as builtin_interfaces/Time has: "header.stamp" of "header.stamp.sec" and
+// "header.stamp.nanosec".  Not where there is one of that name.
+void join_times(LogTable* table);
+
 }  // namespace gapfarm

@@ -96,8 +96,12 @@ class Guess {
   static std::string time_of(const LogTable& table) {
     const std::string stamp = column_of(table, {"*.header.stamp"});
     const std::string time = column_of(table, kTime);
-    if (stamp.empty() || table.topic.empty()) return stamp.empty() ? time : stamp;
+    if (stamp.empty()) return time;
     const auto stamps = numbers(table, stamp), times = numbers(table, "t");
+    if (table.topic.empty()) {
+      const bool set = !stamps.empty() && greatest(stamps) > 0;
+      return set || time.empty() ? stamp : time;
+    }
     const bool near = stamps.size() == times.size() && !times.empty() &&
                       std::abs(stamps.back() - times.back()) < kNearClocks_s &&
                       std::abs(stamps.front() - times.front()) < kNearClocks_s &&

@@ -12,6 +12,7 @@
 #include "common/trials/text/csv.h"
 #include "common/trials/text/mistakes.h"
 #include "master/io/logs/bags.h"
+#include "master/io/logs/column_names.h"
 
 namespace gapfarm {
 namespace {
@@ -314,6 +315,13 @@ Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file
                       "check that the log was written");
   }
   blank_slips(words, file, &table, mistakes);
+  for (const Word& word : words) {
+    std::vector<std::string>& column = table.texts[word.column];
+    for (std::size_t r = column.size() + head.rows; r < rows.size(); ++r) {
+      column.push_back(rows[r].fields[word.column].text);
+    }
+  }
+  join_times(&table);
   const std::string& first = table.columns.front();
   std::string format = "a table with a header";
   if (first == "%time") format = "rostopic echo -p";

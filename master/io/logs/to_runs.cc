@@ -12,28 +12,13 @@
 #include "common/recordings/run.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
+#include "master/io/logs/row_order.h"
 
 namespace gapfarm {
 namespace {
 
 // Seconds since 1970 are 2e9; what is greater than this was never measured.
 constexpr double kGreatest = 1e12;
-// What queues and networks hold up comes later by less, s.
-constexpr double kLatest_s = 1;
-
-// Rows of one kind, of one run; values in SI, one a role after t.
-struct Stretch {
-  std::vector<double> t_s;
-  std::vector<std::vector<double>> rows;
-  bool behind = false;  // the time of the row before this one goes back
-};
-using Stretches = std::map<std::string, Stretch>;  // by run
-
-struct Tally {
-  std::size_t taken = 0, blank = 0, back = 0, dropped = 0;
-  std::string place;  // where times go back, for an error
-  bool set_back = false;
-};
 
 // A file's name without its ending; its folder's where the name says nothing.
 std::string stem_of(const std::string& file) {
@@ -54,11 +39,11 @@ class Importer {
       for (const RowKind& kind : kRowKinds) RETURN_IF_ERROR(take(i, kind));
     }
     for (const RowKind& kind : kRowKinds) {
-      const Tally& tally = tallies_[kind.name];
+      const RowTally& tally = tallies_[kind.name];
       const bool wanted = kind.map == &LogMap::poses || kind.map == &LogMap::commands;
       if (wanted && !(map_.*kind.map).columns.empty() && tally.taken == 0)
         return no_rows(recordings_, map_.*kind.map, kind.name);
-      if (tally.set_back || tally.back > tally.taken) return out_of_order(kind, tally);
+      RETURN_IF_ERROR(check_order(tally, map_.*kind.map, kind.name));
     }
     assemble();
     // A run or two may be short beside what the clocks differ by; a command or two hold on.
@@ -74,15 +59,6 @@ class Importer {
   }
 
  private:
-  // Several runs, a clock that was set back, or rows in no order.
-  static Error out_of_order(const RowKind& kind, const Tally& tally) {
-    return Error{tally.place + ": found " + std::to_string(tally.back) + " of " +
-                 std::to_string(tally.back + tally.taken) + " rows of " + kind.name +
-                 " at times before the row above, expected the order of time; sort them, cut the "
-                 "recording there, take another clock of it as t in the map, or name runs apart by "
-                 "a column and write run = \"COLUMN\" in the map"};
-  }
-
   Status take(std::size_t recording, const RowKind& kind) {
     const TableMap& map = map_.*kind.map;
     if (map.columns.empty()) return {};
@@ -126,7 +102,7 @@ class Importer {
     }
     std::vector<double> counts(at.size(), NAN);
     std::map<std::string, std::vector<double>> before;  // of each run: its last row
-    Tally& tally = tallies_[kind.name];
+    RowTally& tally = tallies_[kind.name];
     const std::set<std::size_t> broken = broken_rows(table);
     std::size_t part = 0;
     for (std::size_t r = 0; r < table.rows(); ++r) {
@@ -168,7 +144,10 @@ class Importer {
         }
       }
       if (!at_its_time(map, poses, before[name], values)) continue;
-      put(tally, stretches_[kind.name][recording][name], values, table.source, r);
+      Stretches& stretches = stretches_[kind.name][recording];
+      const auto [stretch, begun] = stretches.try_emplace(name);
+      if (begun) stretch->second.place = stretches.size();
+      put_row(tally, stretch->second, values, table.source, r);
     }
     used_.insert(table.source);
     return {};
@@ -200,31 +179,14 @@ class Importer {
 
   static std::string run_name(const LogTable& table, const std::optional<std::size_t>& run,
                               std::size_t row, std::size_t part) {
-    const std::string name = run ? format_double(table.at(row, *run)) : "";
+    std::string name;
+    if (run && table.texts.contains(*run)) {
+      name = table.texts.at(*run)[row];
+    } else if (run && std::isfinite(table.at(row, *run))) {
+      name = format_double(table.at(row, *run));
+    }
     if (part == 0) return name;
     return (name.empty() ? "part" : name) + "_" + std::to_string(part);
-  }
-
-  static void put(Tally& tally, Stretch& stretch, std::vector<double> values,
-                  const std::string& source, std::size_t row) {
-    const double last_s = stretch.t_s.empty() ? values.front() : stretch.t_s.back();
-    const bool behind = values.front() < last_s;
-    const bool alone = !std::exchange(stretch.behind, behind);
-    if (behind) {
-      ++tally.back;
-      if (tally.set_back) return;
-      if (alone) {
-        tally.place = source + ": row " + std::to_string(row + 1) +
-                      formatted(" (%.3f s", values[0]) + formatted(" after %.3f s)", last_s);
-      }
-      // Not where one row alone came late.
-      tally.set_back = !alone && last_s - values.front() > kLatest_s;
-      return;
-    }
-    stretch.t_s.push_back(values.front());
-    values.erase(values.begin());
-    stretch.rows.push_back(std::move(values));
-    ++tally.taken;
   }
 
   // Recordings that have both kinds are drives of their own; others are put together in order.
@@ -268,14 +230,19 @@ class Importer {
         for (const std::size_t i : group) {
           const auto found = stretches_[kind.name].find(i);
           if (found == stretches_[kind.name].end()) continue;
-          for (const auto& [run, stretch] : found->second)
-            add(kind, stretch, runs[run], order, run);
+          std::vector<const Stretches::value_type*> appearing;
+          for (const auto& named : found->second) appearing.push_back(&named);
+          std::ranges::sort(appearing, {}, [](const auto* named) { return named->second.place; });
+          for (const auto* named : appearing) {
+            add(kind, named->second, runs[named->first], order, named->first);
+          }
         }
       }
-      std::ranges::sort(order, [&](const auto& a, const auto& b) {
-        const double ta = first_time(runs[a]), tb = first_time(runs[b]);
-        const auto na = parse_double(a), nb = parse_double(b);
-        return na && nb && *na != *nb ? *na < *nb : ta < tb;
+      // By their numbers, else by time, and as they appear where each begins at 0.
+      const bool numbered = std::ranges::all_of(
+          order, [](const std::string& name) { return parse_double(name).has_value(); });
+      std::ranges::stable_sort(order, {}, [&](const std::string& name) {
+        return numbered ? *parse_double(name) : first_time(runs[name]);
       });
       for (const std::string& name : order) {
         LoggedRun& run = runs[name];
@@ -339,7 +306,7 @@ class Importer {
     for (const RowKind& kind : kRowKinds) {
       const TableMap& map = map_.*kind.map;
       if (map.columns.empty()) continue;
-      const Tally& tally = tallies_[kind.name];
+      const RowTally& tally = tallies_[kind.name];
       const std::string source = map.source.empty() ? "" : " of " + map.source;
       out_.report.push_back(
           "took: " + std::to_string(tally.taken) + " " + kind.name + source + " (" +
@@ -372,7 +339,7 @@ class Importer {
   const std::vector<Recording>& recordings_;
   const LogMap& map_;
   std::map<std::string, std::map<std::size_t, Stretches>> stretches_;  // by kind and recording
-  std::map<std::string, Tally> tallies_;
+  std::map<std::string, RowTally> tallies_;
   std::set<std::string> used_;
   ImportedRuns out_;
 };

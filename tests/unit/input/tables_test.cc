@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/ranges.h"
 #include "common/recordings/run.h"
 #include "common/trials/dialect.h"
 #include "common/trials/files.h"
@@ -278,14 +279,55 @@ TEST(Tables, RowsInNoOrderAreRefused) {
   const auto refused = to_runs({table_of(head + run + run + run)}, *map);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message,
-              StartsWith("f.csv: row 6 (0.000 s after 4.000 s): found 8 of 15 rows of poses"));
+              StartsWith("f.csv: row 6 (0.000 s after 4.000 s): found 2 of 15 rows of poses"));
   EXPECT_THAT(refused.error().message, HasSubstr("run = \"COLUMN\""));
   // A clock that is set back once, by less than what follows.
   const auto set_back =
       to_runs({table_of(head + run + "2,5,0,0,1,1\n" + run + "5,6,0,0,1,1\n")}, *map);
   ASSERT_FALSE(set_back);
   EXPECT_THAT(set_back.error().message,
-              StartsWith("f.csv: row 6 (2.000 s after 4.000 s): found 5"));
+              StartsWith("f.csv: row 6 (2.000 s after 4.000 s): found 2"));
+}
+
+TEST(Tables, RunsKeepTheirNamesInTheOrderInWhichTheyAppear) {
+  std::string text = "run,t,x,y,yaw,v,w\n";
+  for (const std::string name : {"tuesday", "monday", "3"}) {
+    for (const char* row : {",0,0,0,0,1,0\n", ",1,1,0,0,1,0\n", ",2,2,0,0,1,0\n"})
+      text += name + row;
+  }
+  const Recording one = table_of(text);
+  const auto runs = to_runs({one}, guess_map({one}));
+  ASSERT_TRUE(runs) << runs.error().message;
+  EXPECT_THAT(mapped(runs->log.runs, &LoggedRun::run), ElementsAre("tuesday", "monday", "3"));
+  for (const LoggedRun& run : runs->log.runs) EXPECT_EQ(run.poses.size(), 3u);
+}
+
+// As ROS has them in JSON and in tables of its messages.
+TEST(Tables, SecondsAndNanosecondsAreOneTime) {
+  for (const auto& [whole, rest] : {std::pair{"sec", "nanosec"}, {"secs", "nsecs"}}) {
+    std::string text =
+        std::string("header.stamp.") + whole + ",header.stamp." + rest + ",x,y,yaw,v,w\n";
+    for (int i = 0; i < 10; ++i) {
+      text += std::to_string(1760000000 + i / 5) + "," + std::to_string(i % 5 * 200000000) + "," +
+              std::to_string(i) + ",0,0,1,0\n";
+    }
+    const Recording one = table_of(text);
+    LogMap map = guess_map({one});
+    EXPECT_EQ(map.poses.find("t")->column, "header.stamp");
+    const auto runs = to_runs({one}, map);
+    ASSERT_TRUE(runs) << runs.error().message;
+    EXPECT_NEAR(runs->log.runs.at(0).poses.at(9).t_s, 1.8, 1e-6);
+    // Whole seconds alone: most poses would be at the time of the one before.
+    for (TableMap* table : {&map.poses, &map.commands}) {
+      table->columns[0].column = std::string("header.stamp.") + whole;
+    }
+    const auto refused = to_runs({one}, map);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message,
+                HasSubstr("8 of 10 rows of poses at the time of the row before, expected column "
+                          "'header.stamp." +
+                          std::string(whole) + "'"));
+  }
 }
 
 }  // namespace gapfarm::tables_test
