@@ -96,14 +96,14 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
     clock.begin(kFaultStage);
     ASSIGN_OR_RETURN(auto sensed, sense(robot, options, &log, &question));
     robot = std::move(sensed);
-    for (const SensorValue& v : question.sensor) {
-      if (v.shown) set_sensor(v, &file);
-    }
   }
   GroundWork work = options;
   work.on_stage = [&](const std::string& stage) { clock.begin(stage); };
   ASSIGN_OR_RETURN(auto search, search_ground(robot, log, question, work));
   search.loop = loop;
+  for (const SensorValue& v : search.sensor) {
+    if (v.shown) set_sensor(v, &file);
+  }
   clock.begin(std::end(kGroundStages)[-1].name);
   GroundDiagnosis result = report_ground(robot, search, options);
   result.corrected = robot_with(file, chosen_values(search, result.values));

@@ -20,6 +20,8 @@ constexpr std::size_t kMostRuns = 9;
 constexpr int kClockSteps = 15;        // either way
 constexpr double kClockStep_s = 0.02;  // either way of the common delay
 constexpr double kNeverSo = -1e300;    // nats
+constexpr std::size_t kFewestApart = 10;
+constexpr double kNoisy = 2;
 
 bool all_alike(const std::vector<CommandedRun>& runs) {
   const std::vector<double>* first = nullptr;
@@ -256,7 +258,27 @@ double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {
   return std::isfinite(least) ? least : 0;
 }
 
-std::string unexplained_text(double share) {
+bool hardly_moved(const RunLog& log) {
+  std::vector<double> ways[2], turns[2];  // of neighbours, and half a run apart
+  for (const LoggedRun& run : log.runs) {
+    const std::size_t apart[] = {1, run.poses.size() / 2};
+    for (std::size_t k = 0; apart[1] >= kFewestApart && k < 2; ++k) {
+      for (std::size_t i = apart[k]; i < run.poses.size(); ++i) {
+        const Pose X = between(run.poses[i - apart[k]].X_WM, run.poses[i].X_WM);
+        ways[k].push_back(std::hypot(X.x, X.y));
+        turns[k].push_back(std::abs(X.theta));
+      }
+    }
+  }
+  return !ways[0].empty() && median(ways[1]) <= kNoisy * median(ways[0]) &&
+         median(turns[1]) <= kNoisy * median(turns[0]);
+}
+
+std::string unexplained_text(double share, bool stood) {
+  if (stood) {
+    return "The robot hardly moved: its poses differ by no more than their own noise, though it "
+           "was commanded to drive. Was it switched on, and did the tracker follow it?";
+  }
   return fmt::format(
       "What is commanded does not explain how the robot moved: the best of what was tried leaves "
       "{:.0f} % of what its motions differ by. Are these the commands and the poses of the same "

@@ -314,7 +314,7 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
     return Error{"the log that values are fitted to is wrong in " + h->thing + ". " + h->remedy};
   }
   if (const double left = share_unexplained(fitter, fit); left >= kUnexplained) {
-    return Error{unexplained_text(left)};
+    return Error{unexplained_text(left, hardly_moved(reference))};
   }
   if (const Eigen::Index far = another_robots(fit); reference.relative && far >= 0) {
     const KinematicRow& row = fit.rows[far].row;

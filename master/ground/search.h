@@ -173,8 +173,10 @@ std::string far_runs(const WindowFitter& fitter, const GroundSearch& search);
 // ends that it explains best: near 1 where commands have nothing to do with how the robot moved.
 // 0: all commands or all motions are alike, so that nobody knows.
 double share_unexplained(const WindowFitter& fitter, const WindowFit& fit);
-// A sentence about such a share.
-std::string unexplained_text(double share);
+// Whether most poses that are half a run apart differ by no more than twice what neighbours do.
+bool hardly_moved(const RunLog& log);
+// A sentence about such a share, and what to look at; `stood`: hardly_moved().
+std::string unexplained_text(double share, bool stood);
 
 // The clocks of two to nine runs, where they are significantly apart: where each run has its own,
 // the windows are by so much better explained than by one for all.  More runs than these are drawn

@@ -100,8 +100,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
     }
   }
   const double floor = mean(search_.best.nats);
-  const WindowFit& before = step.before;
-  const WindowFit& after = search_.chain[place + 1];
+  const WindowFit &before = step.before, &after = search_.chain[place + 1];
   effect.gap_before = floor - mean(before.nats);
   effect.gap_after = floor - mean(after.nats);
   effect.position_mm_before = rms_mm(before);
@@ -225,6 +224,7 @@ void GroundReport::judge() {
   figures_.best_of_all = search_.best_of_all;
   figures_.far_runs = far_runs(fitter_, search_);
   figures_.unexplained = search_.unexplained;
+  figures_.stood = hardly_moved(search_.log);
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
   if (!search_.stand_ins.empty()) d_.findings.push_back(nearest_of_catalogue(search_));
@@ -355,7 +355,8 @@ std::vector<ReportedValue> GroundReport::reported_values() const {
     const double had = row.row.nominal, off = search_.fit.values[j] - had;
     const Interval interval = {intervals_(j, 0), intervals_(j, 1)};
     // What fits move without its name predicts as well, but costs as many nats as a name.
-    const bool known = std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
+    const bool known = search_.unexplained < kUnexplained &&
+                       std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
                        (interval.lower > had || interval.upper < had);
     // Against a reference every value is the two logs' own.
     values.push_back({row.row.name, value_in_file(robot_, row.row.name), search_.fit.values[j],

@@ -202,7 +202,7 @@ std::string verdict_reason(const GroundFigures& figures) {
         closes, kToleratedGap);
   }
   if (figures.unexplained >= kUnexplained) {
-    return unexplained_text(figures.unexplained);
+    return unexplained_text(figures.unexplained, figures.stood);
   }
   if (!figures.far_runs.empty()) {
     return figures.far_runs +
@@ -255,6 +255,7 @@ std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& sea
 }
 
 std::string values_that_would_move(const GroundSearch& search) {
+  if (search.unexplained >= kUnexplained) return "";
   std::vector<std::pair<double, std::string>> moved;
   for (std::size_t k = 0; k < search.fit.rows.size(); ++k) {
     const FitRow& row = search.fit.rows[k];
@@ -308,6 +309,7 @@ std::vector<std::string> cautions_of(const GroundRobot& robot, const GroundSearc
 std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
   if (!search.faults.empty()) return search.catalogue[search.faults[0].hypothesis].remedy;
   if (diagnosis.effects.empty()) {
+    if (search.unexplained >= kUnexplained) return "Put the log right: no value is fitted to it.";
     if (diagnosis.verdict == Verdict::kNone) {
       return "Keep what you have; only more runs, or other drives, could show more.";
     }

@@ -43,6 +43,7 @@ struct GroundFigures {
   std::string far_runs = {};     // which runs are off by themselves; empty: none
   double unexplained = 0;        // share_unexplained() by that best; from kUnexplained on nothing
                                  // is named that commands would have to show
+  bool stood = false;            // hardly_moved()
 };
 
 // Whether a value may be named: its gain's interval lies above 0.

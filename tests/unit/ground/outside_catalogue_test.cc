@@ -54,5 +54,22 @@ TEST(OutsideTheCatalogue, WhatACorrectionMayCloseIsLeft) {
   EXPECT_EQ(found->diagnosis.verdict, Verdict::kEffectAndUnknown) << found->diagnosis.headline;
 }
 
+// Its poses scatter, so that it is no run whose poses never change.
+TEST(OutsideTheCatalogue, ARobotThatHardlyMovesKeepsItsFile) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog log = driven(robot, {}, 0, 1, [](double) { return 0.0; });
+  Stream stream({3, Purpose::kTest, 0, 0, 0});
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses) row.X_WM = row.X_WM * Pose{2e-3 * stream.normal(), 0, 0};
+  }
+  const auto found = diagnose_ground(robot, log, {});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->diagnosis.verdict, Verdict::kUnknown);
+  EXPECT_NE(found->diagnosis.headline.find("hardly moved"), std::string::npos)
+      << found->diagnosis.headline;
+  for (const ReportedValue& value : found->values) EXPECT_FALSE(value.named) << value.name;
+  EXPECT_EQ(format_robot(found->corrected), format_robot(robot));
+}
+
 }  // namespace
 }  // namespace gapfarm
