@@ -168,16 +168,19 @@ HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const 
 
 std::vector<Estimate> derived_estimates(
     const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
-    const std::function<std::vector<Estimate>(const Eigen::VectorXd&)>& derive) {
+    const std::function<std::vector<Estimate>(const Eigen::VectorXd&)>& derive,
+    const std::function<bool(const Eigen::VectorXd&)>& possible) {
   std::vector<Estimate> estimates = derive(fit.values);
   const Eigen::MatrixXd draws = fitter.draws(fit, seed);
+  const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
   std::vector<std::vector<double>> drawn(estimates.size());
-  for (const auto& values : draws.colwise()) {
-    const std::vector<Estimate> derived = derive(values);
+  for (Eigen::Index d = 0; d < draws.cols(); ++d) {
+    const bool stands = !possible || possible(draws.col(d));
+    const std::vector<Estimate> derived =
+        derive(stands ? draws.col(d) : folds[static_cast<std::size_t>(d) % kFolds].values);
     for (std::size_t k = 0; k < drawn.size(); ++k) drawn[k].push_back(derived[k].value);
   }
   Eigen::ArrayXXd parts(estimates.size(), kFolds);
-  const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
   for (Eigen::Index f = 0; f < kFolds; ++f) {
     const std::vector<Estimate> derived = derive(folds[static_cast<std::size_t>(f)].values);
     for (std::size_t k = 0; k < derived.size(); ++k) parts(k, f) = derived[k].value;

@@ -44,10 +44,12 @@ Interval interval_about(double value, std::vector<double> drawn);
 
 // What follows from a fit's values, with 90 % of the draws, no less wide than by what fits without
 // one of the folds each scatter by (the jackknife): slopes where few windows lie, and forms that
-// are right by some share only, make draws too sure.
+// are right by some share only, make draws too sure.  A draw that is not `possible` (none stated:
+// all are) is a step that led beyond where its slopes hold; what fits without a fold stands for it.
 std::vector<Estimate> derived_estimates(
     const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
-    const std::function<std::vector<Estimate>(const Eigen::VectorXd& values)>& derive);
+    const std::function<std::vector<Estimate>(const Eigen::VectorXd& values)>& derive,
+    const std::function<bool(const Eigen::VectorXd& values)>& possible = {});
 
 // Nats a window, with a 90 % interval by runs and blocks drawn again.
 struct HeldOutGain {

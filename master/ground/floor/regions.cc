@@ -119,6 +119,13 @@ bool parts(const std::vector<Vector2d>& places, const Region& region,
   return std::min(there, all - there) > std::max(kLeastInside * all, kLeastPlaces);
 }
 
+// parts() of a fit's values.
+auto parted_by(const Region& region, const WindowFitter& fitter, const WindowFit& fit) {
+  return [&, places = wheel_places(fitter)](const VectorXd& values) {
+    return parts(places, region, fit.rows, values);
+  };
+}
+
 // Values of the best of some borders, the best of every group climbed from.  `rows` are those of
 // the fit and behind them the region's, its ratio last.
 VectorXd best_region(const Region& region, const WindowFitter& fitter, const WindowFit& fit,
@@ -255,8 +262,9 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
   const double angle = wrap_angle(value_of(fit.rows, fit.values, "edge_angle") + turn);
   const Vector2d middle = fitter.windows().origin_m;
   const Differs differs{is_throttled(fitter.robot())};
-  const std::vector<Estimate> found =
-      derived_estimates(fitter, fit, seed, [&](const VectorXd& values) {
+  const std::vector<Estimate> found = derived_estimates(
+      fitter, fit, seed,
+      [&](const VectorXd& values) {
         const double ratio = kEdge.ratio(fit.rows, values);
         const double normal = value_of(fit.rows, values, "edge_angle");
         const double offset = value_of(fit.rows, values, "edge_offset") -
@@ -267,7 +275,8 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
                                         : 1 / ratio),
             {"offset", sign * offset, 0, 0, "m"},
             {"angle", angle + wrap_angle(normal + turn - angle), 0, 0, "rad"}};
-      });
+      },
+      parted_by(kEdge, fitter, fit));
   const Estimate &ratio = found[0], &offset = found[1], &normal = found[2];
   // The interval of the line's place is across it.
   const auto place = [&](const char* key, double from, double part) {
@@ -289,14 +298,18 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
 void describe_friction_patch(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
                              NamedEffect* effect) {
   const Differs differs{is_throttled(fitter.robot())};
-  effect->parameters = derived_estimates(fitter, fit, seed, [&](const VectorXd& values) {
-    const auto of = [&](const char* name) { return value_of(fit.rows, values, name); };
-    const Vector2d& origin = fitter.origin_m();
-    return std::vector<Estimate>{differs(of("patch_ratio")),
-                                 {"x", origin[0] + of("patch_x"), 0, 0, "m"},
-                                 {"y", origin[1] + of("patch_y"), 0, 0, "m"},
-                                 {"radius", of("patch_radius"), 0, 0, "m"}};
-  });
+  effect->parameters = derived_estimates(
+      fitter, fit, seed,
+      [&](const VectorXd& values) {
+        const auto of = [&](const char* name) { return value_of(fit.rows, values, name); };
+        const Vector2d& origin = fitter.origin_m();
+        return std::vector<Estimate>{differs(of("patch_ratio")),
+                                     {"x", origin[0] + of("patch_x"), 0, 0, "m"},
+                                     {"y", origin[1] + of("patch_y"), 0, 0, "m"},
+                                     {"radius", of("patch_radius"), 0, 0, "m"}};
+      },
+      parted_by(kPatch, fitter, fit));
+  effect->parameters[3].lo = std::max(effect->parameters[3].lo, 0.0);
   const std::vector<Estimate>& e = effect->parameters;
   effect->text = fmt::format(
       "The robot drives over a patch of another floor: its wheels {} within {} of x {}, y {} of "

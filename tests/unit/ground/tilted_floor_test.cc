@@ -2,6 +2,7 @@
 // does is the test's own, a speed for a slope, where the diagnosis has a share of the way.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "master/ground/diagnose_ground.h"
@@ -10,17 +11,25 @@
 namespace gapfarm {
 namespace {
 
+// A part of the floor on which wheels travel otherwise.
+struct Patch {
+  Eigen::Vector2d middle_m{0, 0};
+  double radius_m = 0, ratio = 1;
+};
+
 // Four runs of 30 s with other speeds every two seconds.  Downhill the rims run `gained_m_s` ahead
-// of what is commanded.
-RunLog driven_on_slope(double gained_m_s, double downhill_rad, std::uint64_t seed) {
+// of what is commanded.  With a patch there are six, each another way from the origin.
+RunLog driven_on_slope(double gained_m_s, double downhill_rad, std::uint64_t seed,
+                       const Patch& patch = {}) {
   Stream stream({seed, Purpose::kTest, 0, 0, 0});
   RunLog log;
   log.channels = {"left", "right"};
   constexpr double kDt_s = 0.01, kRadius_m = 0.05, kSeparation_m = 0.3;
-  for (int r = 0; r < 4; ++r) {
+  const bool patched = patch.radius_m > 0;
+  for (int r = 0; r < (patched ? 6 : 4); ++r) {
     LoggedRun run;
     run.run = std::to_string(r);
-    Pose X_WR;
+    Pose X_WR{0, 0, patched ? 0.4 * (r - 2) : 0};
     double rims[2] = {0, 0};
     for (int k = 0; k < 3000; ++k) {
       const double t = k * kDt_s;
@@ -37,8 +46,14 @@ RunLog driven_on_slope(double gained_m_s, double downhill_rad, std::uint64_t see
                               wrap_angle(X_WR.theta + 2e-3 * stream.normal())}});
       }
       const double gained = gained_m_s * std::cos(X_WR.theta - downhill_rad);
-      const double v = (rims[0] + rims[1]) / 2 + gained;
-      X_WR = X_WR * exp(Twist(kDt_s * v, 0, kDt_s * (rims[1] - rims[0]) / kSeparation_m));
+      double travel[2];  // of either wheel
+      for (int side = 0; side < 2; ++side) {
+        const Pose at = X_WR * Pose{0, (0.5 - side) * kSeparation_m, 0};
+        const bool there = (Eigen::Vector2d(at.x, at.y) - patch.middle_m).norm() < patch.radius_m;
+        travel[side] = rims[side] * (there ? patch.ratio : 1);
+      }
+      const double v = (travel[0] + travel[1]) / 2 + gained;
+      X_WR = X_WR * exp(Twist(kDt_s * v, 0, kDt_s * (travel[1] - travel[0]) / kSeparation_m));
     }
     log.runs.push_back(std::move(run));
   }
@@ -114,6 +129,21 @@ TEST(TiltedFloor, IsFeltByAThrottle) {
   EXPECT_EQ(angle.key, "angle");
   EXPECT_NEAR(angle.value, kSlope, 0.003);
   EXPECT_NEAR(wrap_angle(way.value - kDownhill_rad), 0, 0.1);
+}
+
+// Few runs cross it: steps of runs drawn again lead to circles that are none.
+TEST(FrictionPatch, HasIntervalsOfWhatCanBe) {
+  const Patch patch{{2, 0.3}, 0.6, 0.8};
+  const Diagnosis d = diagnosed_slope(driven_on_slope(0, 0, 1, patch));
+  const auto found = std::ranges::find(d.effects, "friction_patch", &NamedEffect::name);
+  ASSERT_NE(found, d.effects.end()) << d.headline;
+  const double truths[] = {patch.ratio - 1, patch.middle_m[0], patch.middle_m[1], patch.radius_m};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Estimate& e = found->parameters.at(k);
+    EXPECT_NEAR(e.value, truths[k], 0.1) << e.key;
+    EXPECT_LT(e.hi - e.lo, 2 * patch.radius_m) << e.key;
+  }
+  EXPECT_GT(found->parameters[3].lo, 0);
 }
 
 }  // namespace
