@@ -244,9 +244,9 @@ inline constexpr double kPriceOfAValue = 2;
 inline constexpr double kPriceOfLooking = 4;
 // the best gain | round | For an offer to compete held out.
 inline constexpr double kShareOfBest = 0.5;
-// what the names before moved a window by, gained | chosen: traces in the cases come to 0.2 | What a
-// name leaves of itself to others, above which the next change stands; a simpler word may gain so
-// much less.
+// what the names before moved a window by, gained | chosen: traces in the cases come to 0.2 | What
+// a name leaves of itself to others, above which the next change stands; a simpler word may gain
+// so much less.
 inline constexpr double kTraceShare = 0.25;
 // nats a window | derived: residuals 10 % smaller, 3 ln 1.1 | May be left unexplained for none.
 inline constexpr double kToleratedGap = 0.286;

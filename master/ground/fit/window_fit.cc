@@ -44,11 +44,6 @@ void GroundReference::complete(Kinematics* at) const {
   }
 }
 
-bool GroundReference::leaves_open(const std::string& name) const {
-  const auto found = std::ranges::find(names, name);
-  return found != names.end() && !shown[static_cast<std::size_t>(found - names.begin())];
-}
-
 Eigen::Index row_index(const std::vector<FitRow>& rows, std::string_view name) {
   const auto found =
       std::ranges::find(rows, name, [](const FitRow& r) -> std::string_view { return r.row.name; });

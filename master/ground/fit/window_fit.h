@@ -56,8 +56,8 @@ struct GroundReference : Kinematics {
 
   // With its values where there are none.
   void complete(Kinematics* at) const;
-  // Whether its log does not know a row that it has.
-  bool leaves_open(const std::string& name) const;
+  // Whether there is one of these that it has and its log does not know.
+  bool leaves_open(const std::vector<KinematicRow>& rows) const;
 };
 
 struct WindowFit {

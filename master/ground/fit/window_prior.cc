@@ -75,6 +75,13 @@ std::vector<FitRow> all_free(std::vector<FitRow> rows) {
   return rows;
 }
 
+bool GroundReference::leaves_open(const std::vector<KinematicRow>& rows) const {
+  return std::ranges::any_of(rows, [&](const KinematicRow& row) {
+    const auto found = std::ranges::find(names, row.name);
+    return found != names.end() && !shown[static_cast<std::size_t>(found - names.begin())];
+  });
+}
+
 double prior_deviation(const FitRow& row) {
   if (!row.free) return row.row.tolerance;
   return row.row.farthest > 0 ? row.row.farthest : plausible_error(row.row);

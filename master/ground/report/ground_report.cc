@@ -114,11 +114,8 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.closed_hi = closed.hi;
   // What was gained over what would just have been worth a name.
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
-  const auto& reference = search_.reference;
-  const bool unknown = reference && std::ranges::any_of(h.freed, [&](const KinematicRow& row) {
-                         return reference->leaves_open(row.name);
-                       });
-  effect.text = text_of_values(robot_, h, effect, reference && !unknown);
+  const bool unknown = search_.reference && search_.reference->leaves_open(h.freed);
+  effect.text = text_of_values(robot_, h, effect, search_.reference && !unknown);
   if (h.describe) h.describe(fitter_, search_.fit, options_.seed, &effect);
   if (unknown) effect.text += " The reference does not show it, so it may have been so before.";
   return effect;
@@ -338,9 +335,7 @@ void GroundReport::name_headline() {
   d_.headline = d_.effects.front().text;
   if (changes && d_.effects.size() == 1 && !d_.headline.empty()) {
     d_.headline.back() = ';';
-    d_.headline += d_.verdict == Verdict::kEffect ? " nothing else."
-                   : something_is_left(figures_)  ? " something else, too, that is not named."
-                                                  : " whether something else, too, is open.";
+    d_.headline += d_.verdict == Verdict::kEffect ? " nothing else." : " it does not explain all.";
   }
   if (d_.effects.size() > 1) {
     d_.headline +=
