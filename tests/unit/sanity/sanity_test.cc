@@ -302,7 +302,9 @@ TEST(Sanity, TakesNoLongTurnsForTurnsTheOtherWay) {
     for (Trial& t : log.log.trials) std::swap(t.left, t.right);
     EXPECT_EQ(first_name(log), duration_s > 2 ? "" : "sides_swapped") << duration_s;
     const auto of_any_gauge = check_axes(drive_samples(log), {0.005, 30, 0.4, 0});
-    if (duration_s == 1) EXPECT_EQ(of_any_gauge.value_or(SanityFinding{}).name, "sides_swapped");
+    if (duration_s == 1) {
+      EXPECT_EQ(of_any_gauge.value_or(SanityFinding{}).name, "sides_swapped");
+    }
     std::erase_if(log.log.trials, [](const Trial& t) { return t.command.starts_with("wide"); });
     EXPECT_EQ(first_name(log), duration_s > 1 ? "" : "sides_swapped") << duration_s;
   }
