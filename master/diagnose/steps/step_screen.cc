@@ -128,27 +128,22 @@ Result<Screening> compete_from_free_base(const DiagnosisRequest& of, Explanation
   return compete(of, std::move(found));
 }
 
-// Whether what was chosen leaves too much to be named.
-Result<bool> leaves_too_much(const DiagnosisRequest& of, const Screening& screening) {
-  if (screening.found.chosen.empty()) return false;
-  ASSIGN_OR_RETURN(const auto judged, judge(of, screening));
-  return judged.verdict == Verdict::kUnknown;
-}
-
 // Alone the base may have been tuned to where slopes say nothing of it beside what moves the robot.
-// Where what competes beside them leaves too much, base and hypotheses are searched together.
+// Where what competes beside them leaves too much to be named, base and hypotheses are searched
+// together; with so much room they have to leave nothing.
 Result<Screening> compete_from_both(const DiagnosisRequest& of, Explanation beside) {
   auto held = compete(of, beside);
   if (!held || of.subject.base_moves || of.options.keep_base) return held;
-  ASSIGN_OR_RETURN(const auto too_much, leaves_too_much(of, *held));
-  if (!too_much) return held;
+  if (held->found.chosen.empty()) return held;
+  ASSIGN_OR_RETURN(const auto beside_held, judge(of, *held));
+  if (beside_held.verdict != Verdict::kUnknown) return held;
   beside.frees_base = true;
   auto freed = compete_from_free_base(of, std::move(beside));
   if (!freed && freed.error().code == ErrorCode::kSimulation) return held;
   if (!freed) return freed;
   if (freed->found.chosen.empty() || base_is_on_bounds(freed->found)) return held;
-  ASSIGN_OR_RETURN(const auto still, leaves_too_much(of, *freed));
-  return still ? std::move(held) : std::move(freed);
+  ASSIGN_OR_RETURN(const auto beside_freed, judge(of, *freed));
+  return beside_freed.verdict == Verdict::kEffect ? std::move(freed) : std::move(held);
 }
 
 Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explanation& found) {
