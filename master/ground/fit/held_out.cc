@@ -175,9 +175,12 @@ std::vector<Estimate> derived_estimates(
   const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
   std::vector<std::vector<double>> drawn(estimates.size());
   for (Eigen::Index d = 0; d < draws.cols(); ++d) {
-    const bool stands = !possible || possible(draws.col(d));
-    const std::vector<Estimate> derived =
-        derive(stands ? draws.col(d) : folds[static_cast<std::size_t>(d) % kFolds].values);
+    std::vector<Estimate> derived = derive(draws.col(d));
+    if (possible && !possible(draws.col(d))) {
+      const double size = derived.front().value;
+      derived = derive(folds[static_cast<std::size_t>(d) % kFolds].values);
+      derived.front().value = size;
+    }
     for (std::size_t k = 0; k < drawn.size(); ++k) drawn[k].push_back(derived[k].value);
   }
   Eigen::ArrayXXd parts(estimates.size(), kFolds);

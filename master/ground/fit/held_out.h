@@ -45,7 +45,8 @@ Interval interval_about(double value, std::vector<double> drawn);
 // What follows from a fit's values, with 90 % of the draws, no less wide than by what fits without
 // one of the folds each scatter by (the jackknife): slopes where few windows lie, and forms that
 // are right by some share only, make draws too sure.  A draw that is not `possible` (none stated:
-// all are) is a step that led beyond where its slopes hold; what fits without a fold stands for it.
+// all are) is a step that led beyond where its slopes hold: what fits without a fold stands for it,
+// but for the first of what follows, the size, which may be none.
 std::vector<Estimate> derived_estimates(
     const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
     const std::function<std::vector<Estimate>(const Eigen::VectorXd& values)>& derive,
