@@ -232,7 +232,7 @@ TEST(WhatChanged, GoesOnFromTheFitsOfADiagnosisThatWasStopped) {
   GroundDiagnoseOptions options;
   options.memo = &memo;
   int asked = 0;
-  options.stopped = [&] { return ++asked > 24; };
+  options.stopped = [&] { return ++asked > 30; };
   const auto stopped = diagnose_ground(robot, log, options);
   ASSERT_FALSE(stopped.ok());
   const std::size_t before = memo.kept.size();
