@@ -9,6 +9,7 @@
 #include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "master/ground/fit/scans.h"
+#include "master/ground/free_residual.h"
 #include "master/ground/search.h"
 #include "master/ground/tolerances.h"
 
@@ -197,25 +198,79 @@ double own_values_shrink(const WindowFitter& fitter, const GroundSearch& search,
   return gain < kFaultGain ? 1 : std::exp(gain * windows.lengths / (3 * count));
 }
 
+// Of every window: how far it misses, in scales of its length.
+std::vector<double> misses(const WindowFit& fit, const WindowSet& windows) {
+  std::vector<double> missed;
+  for (std::size_t i = 0; i < fit.residuals.size(); ++i) {
+    const Eigen::Vector3d& scale = fit.scales[static_cast<std::size_t>(windows.horizon[i])];
+    missed.push_back(fit.residuals[i].cwiseQuotient(scale).norm());
+  }
+  return missed;
+}
+
+// The windows of a length in which the robot is to move: to drive or to turn half as fast as in
+// the fastest tenth of them.  Where it stands nothing misses.
+std::vector<std::size_t> moving(const std::vector<WindowSpeeds>& speeds, const WindowSet& windows,
+                                int length) {
+  std::vector<std::size_t> of_length;
+  std::vector<double> ahead, turns;
+  for (std::size_t i = 0; i < speeds.size(); ++i) {
+    if (windows.horizon[i] != length) continue;
+    of_length.push_back(i);
+    ahead.push_back(std::abs(speeds[i].ahead_m_s));
+    turns.push_back(std::abs(speeds[i].turn_rad_s));
+  }
+  if (of_length.empty()) return {};
+  const double fast = quantile(ahead, 0.9), turning = quantile(turns, 0.9);
+  std::erase_if(of_length, [&](std::size_t i) {
+    return 2 * std::abs(speeds[i].ahead_m_s) < fast && 2 * std::abs(speeds[i].turn_rad_s) < turning;
+  });
+  return of_length;
+}
+
+// Where many windows miss by far more than half of them do; empty: nowhere.
+std::string far_windows(const WindowFitter& fitter, const GroundSearch& search,
+                        const std::vector<double>& missed) {
+  const WindowSet& windows = search.windows;
+  const std::vector<WindowSpeeds> speeds = window_speeds(fitter, search.fit);
+  double most = kFarShare;
+  std::string text;
+  for (int length = 0; length < windows.lengths; ++length) {
+    const std::vector<std::size_t> moves = moving(speeds, windows, length);
+    if (moves.size() < kFewestReadings) continue;
+    const double middle = median(mapped(moves, [&](std::size_t i) { return missed[i]; }));
+    std::vector<std::size_t> far = moves;
+    std::erase_if(far, [&](std::size_t i) { return missed[i] <= kFarRun * middle; });
+    const double share = static_cast<double>(far.size()) / static_cast<double>(moves.size());
+    if (share < most) continue;
+    most = share;
+    const std::string& run = search.log.runs[windows.run_of[far[0]]].run;
+    text = fmt::format(
+        "Of the windows of {} in which the robot is to move {:.0f} % miss by more than {:g} times "
+        "what half of them do, the first at {:.1f} s of run {}: something comes and goes. Look at "
+        "the commands and the poses there: commands that did not arrive, wheels that slipped, a "
+        "robot that was held, poses that are not its own.",
+        windows.length_text(length), 100 * share, kFarRun, windows.trials[far[0]].t_s.value_or(0),
+        run);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
   const WindowSet& windows = search.windows;
-  const WindowFit& fit = search.fit;
-  const std::vector<std::size_t>& run = windows.run_of;
-  std::vector<std::vector<double>> misses(windows.run_blocks.size());
-  for (std::size_t i = 0; i < run.size(); ++i) {
-    const Eigen::Vector3d& scale = fit.scales[static_cast<std::size_t>(windows.horizon[i])];
-    misses[run[i]].push_back(fit.residuals[i].cwiseQuotient(scale).norm());
-  }
+  const std::vector<double> missed = misses(search.fit, windows);
+  std::vector<std::vector<double>> of_runs(windows.run_blocks.size());
+  for (std::size_t i = 0; i < missed.size(); ++i) of_runs[windows.run_of[i]].push_back(missed[i]);
   std::vector<std::string> far;
-  for (std::size_t r = 0; r < misses.size(); ++r) {
+  for (std::size_t r = 0; r < of_runs.size(); ++r) {
     std::vector<double> others;
-    for (std::size_t other = 0; other < misses.size(); ++other) {
-      if (other != r && !misses[other].empty()) others.push_back(median(misses[other]));
+    for (std::size_t other = 0; other < of_runs.size(); ++other) {
+      if (other != r && !of_runs[other].empty()) others.push_back(median(of_runs[other]));
     }
-    if (misses[r].empty() || others.size() < 2) continue;
-    const double times = median(misses[r]) / std::max(median(others), 1e-12);
+    if (of_runs[r].empty() || others.size() < 2) continue;
+    const double times = median(of_runs[r]) / std::max(median(others), 1e-12);
     const bool has_own = times > kFaultShrinks && !windows.simulated && !search.reference &&
                          own_values_shrink(fitter, search, r) > kFaultShrinks;
     if (!has_own && !(times > kFarRun)) continue;
@@ -223,7 +278,10 @@ std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
                               search.log.runs[r].run, times,
                               has_own ? ", and other values fit it" : ""));
   }
-  return joined(far, " ");
+  if (far.empty()) return far_windows(fitter, search, missed);
+  return joined(far, " ") +
+         " Look at the commands and the poses of these: another run's, the other way round, or "
+         "something that happened there alone.";
 }
 
 double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {

@@ -381,7 +381,7 @@ Diagnosis GroundReport::write() {
   screening();
   trials();
   name_headline();
-  d_.action = what_to_do(search_, d_);
+  d_.action = what_to_do(search_, figures_, d_);
   return std::move(d_);
 }
 

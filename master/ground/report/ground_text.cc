@@ -204,11 +204,7 @@ std::string verdict_reason(const GroundFigures& figures) {
   if (figures.unexplained >= kUnexplained) {
     return unexplained_text(figures.unexplained, figures.stood);
   }
-  if (!figures.far_runs.empty()) {
-    return figures.far_runs +
-           " Look at the commands and the poses of these: another run's, the other way round, or "
-           "something that happened there alone.";
-  }
+  if (!figures.far_runs.empty()) return figures.far_runs;
   if (something_is_left(figures)) {
     const std::string what = figures.best_of_all.empty() ? "" : ", " + figures.best_of_all + ",";
     return fmt::format(
@@ -306,18 +302,21 @@ std::vector<std::string> cautions_of(const GroundRobot& robot, const GroundSearc
   return cautions;
 }
 
-std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis) {
+std::string what_to_do(const GroundSearch& search, const GroundFigures& figures,
+                       const Diagnosis& diagnosis) {
   if (!search.faults.empty()) return search.catalogue[search.faults[0].hypothesis].remedy;
   if (diagnosis.effects.empty()) {
     if (search.unexplained >= kUnexplained) return "Put the log right: no value is fitted to it.";
     if (diagnosis.verdict == Verdict::kNone) {
       return "Keep what you have; only more runs, or other drives, could show more.";
     }
-    if (search.best_of_all == kSmallMoves && !search.windows.simulated) {
+    const bool far = !figures.far_runs.empty();
+    if (!far && search.best_of_all == kSmallMoves && !search.windows.simulated) {
       return "Fit all values at once: gapfarm export ros, of the config, prints them.";
     }
-    return search.smooth ? "Look at how errors vary with the " + search.smooth->covariate + "."
-                         : "Look first at the windows that miss most, below.";
+    return search.smooth && !far
+               ? "Look at how errors vary with the " + search.smooth->covariate + "."
+               : "Look first at the windows that miss most, below.";
   }
   if (search.reference) return "Put right what changed, or fit the robot anew from then on.";
   if (search.windows.simulated) return "Give these values to the program.";

@@ -89,6 +89,7 @@ std::string further_values(const GroundSearch& search, const std::vector<Reporte
 std::vector<std::string> cautions_of(const GroundRobot& robot, const GroundSearch& search);
 
 // The one thing to do about it, by the verdict and the effects of `diagnosis`; a sentence.
-std::string what_to_do(const GroundSearch& search, const Diagnosis& diagnosis);
+std::string what_to_do(const GroundSearch& search, const GroundFigures& figures,
+                       const Diagnosis& diagnosis);
 
 }  // namespace gapfarm

@@ -54,6 +54,20 @@ TEST(OutsideTheCatalogue, WhatACorrectionMayCloseIsLeft) {
   EXPECT_EQ(found->diagnosis.verdict, Verdict::kEffectAndUnknown) << found->diagnosis.headline;
 }
 
+// Neither a value nor a correction foresees which commands were lost.
+TEST(OutsideTheCatalogue, CommandsThatDoNotArriveAreSomething) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const Kinematics as_filed = off_by({"left", "right", "separation", "lag", "marker_x", "marker_y"},
+                                     {1, 1, 1, 0.1, 0.02, 0.01});
+  int sides = 0;
+  const auto lossy = [&](double c) { return (sides++ / 2) % 12 == 5 ? 0 : c; };
+  const auto found = diagnose_ground(robot, driven(robot, as_filed, 0, 1, lossy, 45), {});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->diagnosis.verdict, Verdict::kUnknown) << found->diagnosis.headline;
+  EXPECT_NE(found->diagnosis.headline.find("comes and goes"), std::string::npos)
+      << found->diagnosis.headline;
+}
+
 // Its poses scatter, so that it is no run whose poses never change.
 TEST(OutsideTheCatalogue, ARobotThatHardlyMovesKeepsItsFile) {
   const GroundRobot robot = robot_of(kDifferential);
