@@ -79,6 +79,12 @@ bool is_unborn(const fs::path& file) {
 
 }  // namespace
 
+Status RunStore::check_free(const fs::path& run) {
+  if (is_unborn(run / "run.sqlite")) return {};
+  return Error{run.string() + ": holds a run already; continue it with `gapfarm resume " +
+               shell_quoted(run.string()) + "`, or choose another --out"};
+}
+
 Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   std::error_code code;
   const bool made = fs::create_directories(run, code);
@@ -87,12 +93,8 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
                  "; choose another --out"};
   }
   ASSIGN_OR_RETURN(RunLock lock, RunLock::take(run));
-  const fs::path file = run / "run.sqlite";
-  if (!is_unborn(file)) {
-    return Error{run.string() + ": holds a run already; continue it with `gapfarm resume " +
-                 shell_quoted(run.string()) + "`, or choose another --out"};
-  }
-  ASSIGN_OR_RETURN(Database database, Database::open(file, Database::Mode::kCreate));
+  RETURN_IF_ERROR(check_free(run));
+  ASSIGN_OR_RETURN(Database database, Database::open(run / "run.sqlite", Database::Mode::kCreate));
   RunInfo complete = info;
   if (complete.program_version.empty()) complete.program_version = build_info().version;
   if (complete.fingerprint.empty()) complete.fingerprint = build_info().fingerprint;

@@ -30,6 +30,9 @@ class RunStore {
   // holds a run already, is in use, or cannot be written.
   static Result<RunStore> create(const std::filesystem::path& run, const RunInfo& info);
 
+  // Error: the folder holds a run already.
+  static Status check_free(const std::filesystem::path& run);
+
   // Takes away a run that never had a generation, and its folder too when asked and empty.
   static Status discard(RunStore store, bool with_folder);
 

@@ -44,6 +44,8 @@ TEST_F(Overwrite, NoCommandTakesAMeasuredFile) {
                              "--generations", "1", "--workers", "1"})
                 .exit_code,
             0);
+  refused({"evolve", config_, "--trials", log_, "--out", folder_ / "run", "--dry-run"}, model,
+          "holds a run already");
   const std::string read = "is read by this command";
   refused({"predict", folder_ / "run", "--trials", log_, "--out", log_, "--force"}, log_, read);
   refused({"predict", folder_ / "run", "--trials", log_, "--out", model, "--force"}, model, read);

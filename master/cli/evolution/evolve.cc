@@ -10,6 +10,7 @@
 #include "master/command/long_command.h"
 #include "master/run/run.h"
 #include "master/run/stored_run.h"
+#include "master/store/run_store.h"
 
 namespace gapfarm {
 namespace {
@@ -72,7 +73,10 @@ Result<int> run_evolve(EvolveCommand command, CliContext& context) {
         return command.options.plan(command.out, read, command.from);
       }));
   show_warnings(config.problem, config.trial_files, context.console);
-  if (context.dry_run) return print_plan(command, config, context);
+  if (context.dry_run) {
+    RETURN_IF_ERROR(RunStore::check_free(command.out));
+    return print_plan(command, config, context);
+  }
   context.console.note(command.out + ": evolving " + what_evolves(config.problem) + ", seed " +
                        std::to_string(config.seed));
   return begin_run(command.out, config, command.options, command.options.overrides, *log, context);
