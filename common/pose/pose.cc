@@ -44,11 +44,26 @@ Pose exp(const Twist& xi) {
   return {a * xi[0] - b * xi[1], b * xi[0] + a * xi[1], wrap_angle(theta)};
 }
 
-Twist log(const Pose& X) {
-  const double theta = wrap_angle(X.theta);
-  const double half = theta / 2;
-  const double cot = std::abs(theta) < 1e-4 ? 1 - theta * theta / 12 : half / std::tan(half);
-  return {cot * X.x + half * X.y, -half * X.x + cot * X.y, theta};
+Twist log(const Pose& X) { return log(X, wrap_angle(X.theta)); }
+
+Twist log(const Pose& X, double theta_rad) {
+  const double half = theta_rad / 2;
+  const double cot =
+      std::abs(theta_rad) < 1e-4 ? 1 - theta_rad * theta_rad / 12 : half / std::tan(half);
+  return {cot * X.x + half * X.y, -half * X.x + cot * X.y, theta_rad};
+}
+
+Eigen::Matrix3d end_slopes(const Twist& xi) {
+  const double theta = xi[2];
+  const bool small = std::abs(theta) < 1e-4;
+  const double a = small ? 1 - theta * theta / 6 : std::sin(theta) / theta;
+  const double q = small ? 0.5 - theta * theta / 24 : (1 - std::cos(theta)) / (theta * theta);
+  const double p = small ? theta / 6 : (theta - std::sin(theta)) / (theta * theta);
+  Eigen::Matrix3d J;
+  J << a, q * theta, p * xi[0] - q * xi[1],  //
+      -q * theta, a, q * xi[0] + p * xi[1],  //
+      0, 0, 1;
+  return J;
 }
 
 Eigen::Vector3d local_difference(const Pose& predicted, const Pose& measured) {

@@ -33,6 +33,12 @@ Pose between(const Pose& X_AB, const Pose& X_AC);
 // Exponential and logarithm of SE(2): exp(log(X)) == X for |theta| < pi.
 Pose exp(const Twist& xi);
 Twist log(const Pose& X);
+// The same of a motion that turned by `theta_rad`, which may be more than half a circle.
+Twist log(const Pose& X, double theta_rad);
+
+// How a small change of a motion moves its end, in the end's axes: exp(xi + d) is exp(xi) exp(J d)
+// to first order (the right Jacobian of Sola, Deray and Atchuthan 2018).
+Eigen::Matrix3d end_slopes(const Twist& xi);
 
 // (x, y, wrapped theta) of `measured` seen from `predicted`; unlike log() its density in
 // (m, m, rad) is the density of the measured pose itself, since a rotation keeps volume.

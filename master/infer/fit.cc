@@ -99,7 +99,9 @@ Fitter::Fitter(const Forward& forward, const Observations& observations, Space s
       sides_(sides) {}
 
 Eigen::Vector3d Fitter::residual(std::size_t i, const Pose& end) const {
-  return observations_.whitener[i] * local_difference(end, observations_.measured[i]);
+  return observations_.whitener[i] * (observations_.difference
+                                          ? observations_.difference(i, end)
+                                          : local_difference(end, observations_.measured[i]));
 }
 
 Eigen::VectorXd Fitter::whitened(const std::vector<Pose>& ends) const {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -21,10 +22,12 @@ namespace gapfarm::infer {
 // with the other, Yohai 1987).
 enum class Loss { kStudent, kHuber, kRedescending };
 
-// What was measured: a pose an observation, what it varies by, and the part of the data that it is
-// held out with.
+// What was measured: a pose an observation, or how far it is from a predicted one, what it varies
+// by, and the part of the data that it is held out with.
 struct Observations {
   std::vector<Pose> measured;
+  // In place of them: of an observation and its predicted pose, in that one's axes.
+  std::function<Eigen::Vector3d(std::size_t, const Pose&)> difference = {};
   std::vector<Eigen::Matrix3d>
       whitener;                   // L^-1 of its covariance L L', in the predicted pose's axes
   std::vector<std::size_t> fold;  // from 0
@@ -39,7 +42,7 @@ struct Observations {
   // Those that are simulated (ascending); the others have no weight.  Empty: all.
   std::vector<std::uint32_t> asked = {};
 
-  std::size_t size() const { return measured.size(); }
+  std::size_t size() const { return whitener.size(); }
 };
 
 struct Fit {

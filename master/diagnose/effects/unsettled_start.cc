@@ -22,11 +22,15 @@ std::vector<double> tried_angles() {
 
 bool follows_move(const ResidualTrial& trial) { return trial.context.moved; }
 
-// What the logged end misses its prediction by when the start's heading was logged that far to the
-// left of the robot's.
-Eigen::Vector3d missed_by_turn(const ResidualTrial& trial, double turn_rad) {
-  const Pose X_WS = trial.X_WS * Pose{0, 0, -turn_rad};
-  return local_difference(trial.X_WP, X_WS * between(trial.X_WS, trial.X_WP));
+// What is left of a residual when the start's heading was logged that far to the left of the
+// robot's.
+Eigen::Vector3d left_by_turn(const ResidualTrial& trial, const Eigen::Vector3d& residual,
+                             double turn_rad) {
+  ResidualTrial turned = trial;
+  turned.X_WS = trial.X_WS * Pose{0, 0, -turn_rad};
+  turned.X_WE = end_with(trial, trial.X_WP, residual);
+  turned.late.setZero();
+  return residual_of(turned, turned.X_WS * between(trial.X_WS, trial.X_WP));
 }
 
 // Density of each trial, were its start turned by up to an angle, over that without a turn.
@@ -37,7 +41,7 @@ std::vector<double> turned_ratios(const Study& study, const std::vector<Eigen::V
   for (const StartTurn& turn : uniform_turns(angle_rad)) {
     std::vector<Eigen::Vector3d> left = residuals;
     for (std::size_t i = 0; i < left.size(); ++i) {
-      left[i] -= missed_by_turn(study.trials[i], turn.turn_rad);
+      left[i] = left_by_turn(study.trials[i], residuals[i], turn.turn_rad);
     }
     const std::vector<double> scores = scores_of(study, left, outlier_share);
     for (std::size_t i = 0; i < ratio.size(); ++i) {

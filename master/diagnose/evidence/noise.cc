@@ -85,6 +85,7 @@ std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
                                             Study* study) {
   Regression rich = nuisances;
   std::vector<bool> used(blocks.size(), false);
+  Eigen::Index columns = 0;
   for (;;) {
     const Eigen::VectorXd left = rich.left();
     std::vector<double> squares(left.data(), left.data() + left.size());
@@ -94,6 +95,8 @@ std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
     double best_z = kClearlyThere;
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       if (used[b]) continue;
+      // More columns than half of what they explain leave no scatter to speak of.
+      if (2 * (columns + blocks[b].columns.cols()) > rich.left().size()) continue;
       const Gain gain = rich.gain(blocks[b].columns);
       if (gain.dimensions == 0) continue;
       const double z = (gain.squares / scale - gain.dimensions) / std::sqrt(2.0 * gain.dimensions);
@@ -104,6 +107,7 @@ std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
     }
     if (best == blocks.size()) break;
     used[best] = true;
+    columns += blocks[best].columns.cols();
     rich.add(blocks[best].columns);
   }
   const std::vector<Eigen::Vector3d> residuals = study->unwhiten(studentised(rich, 0.1));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "common/math/statistics.h"
 #include "master/infer/settings.h"
@@ -34,10 +35,39 @@ double one_of_two(std::vector<double> gaps, double quantum, double far, double h
   return std::max(spread(gaps, INFINITY) / std::numbers::sqrt2, quantum / std::sqrt(12.0));
 }
 
+// How far from its start a motion leads, over its way; below 0 in every second round.
+double led_by(double turn_rad) {
+  return std::abs(turn_rad) < 1e-4 ? 1 : 2 * std::sin(turn_rad / 2) / turn_rad;
+}
+
+// The motion that is predicted to end there; none of pushes, and where one that turns by so much
+// more leads otherwise far, as near a whole turn.
+std::optional<Twist> motion_to(const ResidualTrial& trial, const Pose& X_WP, double more_rad) {
+  constexpr double kOtherwise = 2;
+  if (of_gain(trial).isZero(0)) return std::nullopt;
+  const Pose X_SP = between(trial.X_WS, X_WP);
+  // What the sides do to a heading says how many times it went round.
+  constexpr double kTwoPi = 2 * std::numbers::pi;
+  const double turn = X_SP.theta + kTwoPi * std::round((of_gain(trial)[2] - X_SP.theta) / kTwoPi);
+  const double ratio = led_by(turn + more_rad) / led_by(turn);
+  if (!(ratio > 1 / kOtherwise && ratio < kOtherwise)) return std::nullopt;
+  return log(X_SP, turn);
+}
+
 }  // namespace
 
 Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP) {
-  return local_difference(X_WP, trial.X_WE) - trial.late - trial.bent;
+  const Eigen::Vector3d chord = local_difference(X_WP, trial.X_WE);
+  const auto motion = motion_to(trial, X_WP, chord[2]);
+  if (!motion) return chord - trial.late;
+  const Twist moved = log(between(trial.X_WS, trial.X_WE), (*motion)[2] + chord[2]);
+  return end_slopes(*motion) * (moved - *motion) - trial.late;
+}
+
+Pose end_with(const ResidualTrial& trial, const Pose& X_WP, const Eigen::Vector3d& residual) {
+  const auto motion = motion_to(trial, X_WP, residual[2]);
+  if (!motion) return X_WP * Pose{residual[0], residual[1], residual[2]};
+  return trial.X_WS * exp(*motion + end_slopes(*motion).inverse() * residual);
 }
 
 Eigen::Matrix3d reading_covariance(const ResidualTrial& trial, const PoseNoise& noise) {

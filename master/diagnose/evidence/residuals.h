@@ -43,8 +43,6 @@ struct ResidualTrial {
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   // What readings that came late did to it: omitted from the residual.
   Eigen::Vector3d late = Eigen::Vector3d::Zero();
-  // What its session's gain does to it beyond first order: omitted, too.
-  Eigen::Vector3d bent = Eigen::Vector3d::Zero();
   // Change of the predicted end for a unit change of each side's gain.
   Eigen::Vector3d left = Eigen::Vector3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -55,8 +53,14 @@ struct ResidualTrial {
 // Change of the predicted end for a unit change of both sides' gain.
 inline Eigen::Vector3d of_gain(const ResidualTrial& trial) { return trial.left + trial.right; }
 
-// Of the measured end, were it predicted there.
+// Of the measured end, were it predicted there: how much farther the robot drove and turned all the
+// way, as it moves the predicted end.  Of a drive whose sides' gains changed by any amount it is
+// the sum of what they do, since they add to its motion (Murray, Li and Sastry 1994), while its end
+// leaves their straight lines along an arc.  Of pushes, and of whole turns, whose end says little of
+// the motion: the measured end in the predicted one's axes.
 Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP);
+// The measured end of which that is the residual, were nothing late.
+Pose end_with(const ResidualTrial& trial, const Pose& X_WP, const Eigen::Vector3d& residual);
 
 // Standard deviations of everything random, per trial.
 struct NoiseEstimate {

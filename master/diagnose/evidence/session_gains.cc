@@ -193,19 +193,6 @@ SpreadFit fit_session_gains(const Study& study, const std::vector<Eigen::Vector3
   return fit;
 }
 
-void bend_by_session_gains(const std::vector<SessionGain>& sessions, Study* study,
-                           std::vector<Eigen::Vector3d>* left) {
-  for (std::size_t i = 0; i < study->size(); ++i) {
-    ResidualTrial& t = study->trials[i];
-    const Twist along = sessions[t.session].gain * of_gain(t);
-    const Pose end = exp(along);
-    const Eigen::Vector3d bent = Eigen::Vector3d(end.x, end.y, end.theta) - along;
-    (*left)[i] -= bent - t.bent;
-    t.bent = bent;
-  }
-  study->use_predicted_ends(study->predicted_ends());
-}
-
 namespace {
 
 struct ForeseenGains {

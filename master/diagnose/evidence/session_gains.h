@@ -68,13 +68,6 @@ struct FoundSpread {
 SpreadFit fit_session_gains(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                             double outlier_share);
 
-// A robot that drives by a share farther on an arc ends that share farther along its screw
-// (Murray, Li and Sastry 1994), which is a straight line to first order alone: with a gain of 0.25
-// half a turn on an arc of 20 cm ends 1.9 cm beside that.  What is beyond leaves the trials'
-// residuals, and those in `left`.
-void bend_by_session_gains(const std::vector<SessionGain>& sessions, Study* study,
-                           std::vector<Eigen::Vector3d>* left);
-
 // Log scores (nats) of every trial, its session's gain predicted by the session's other trials.
 std::vector<double> scores_with_session_gains(const Study& study,
                                               const std::vector<Eigen::Vector3d>& residuals,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/pose/pose.h"
 #include "common/score/density.h"
 #include "master/infer/climb.h"
 #include "master/infer/settings.h"
@@ -35,40 +34,6 @@ std::vector<Event> events_of(double probability, double loss) {
   }
   return all;
 }
-
-// How a small change of a motion moves its end, in the end's axes: exp(xi + d) is exp(xi) exp(J d)
-// to first order (the right Jacobian of Sola, Deray and Atchuthan 2018).
-Eigen::Matrix3d end_slopes(const Twist& xi) {
-  const double theta = xi[2];
-  const bool small = std::abs(theta) < 1e-4;
-  const double a = small ? 1 - theta * theta / 6 : std::sin(theta) / theta;
-  const double q = small ? 0.5 - theta * theta / 24 : (1 - std::cos(theta)) / (theta * theta);
-  const double p = small ? theta / 6 : (theta - std::sin(theta)) / (theta * theta);
-  Eigen::Matrix3d J;
-  J << a, q * theta, p * xi[0] - q * xi[1],  //
-      -q * theta, a, q * xi[0] + p * xi[1],  //
-      0, 0, 1;
-  return J;
-}
-
-// Where a drive ends whose sides' gains change, seen from where it would: not to first order, since
-// a side that loses half its speed leads along an arc.
-class Arc {
- public:
-  explicit Arc(const ResidualTrial& t)
-      : motion_(log(between(t.X_WS, t.X_WP))), back_(exp(Twist(-motion_))) {
-    const Eigen::Matrix3d motion_of_end = end_slopes(motion_).inverse();
-    left_ = motion_of_end * t.left;
-    right_ = motion_of_end * t.right;
-  }
-  Pose end(double left, double right) const {
-    return back_ * exp(Twist(motion_ + left * left_ + right * right_));
-  }
-
- private:
-  Twist motion_, left_, right_;
-  Pose back_;
-};
 
 }  // namespace
 
@@ -148,13 +113,11 @@ std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
       continue;
     }
     const Eigen::Vector3d centred = residuals[i] - mean_loss * (t.left + t.right);
-    const Pose measured{centred[0], centred[1], centred[2]};
-    const Arc arc(t);
     std::vector<double> logs;
     const double squared = cov->squared_distance(centred);
     double nearest = squared;
     for (const Event& e : events) {
-      const Eigen::Vector3d r = local_difference(arc.end(e.left, e.right), measured);
+      const Eigen::Vector3d r = centred - e.left * t.left - e.right * t.right;
       const bool one_side = e.left == 0 || e.right == 0;  // both at once are rare
       if (one_side) nearest = std::min(nearest, cov->squared_distance(r));
       logs.push_back(std::log(e.weight) + log_predictive_density(r, *cov, outlier_share));

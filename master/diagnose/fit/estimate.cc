@@ -139,10 +139,9 @@ Eigen::MatrixXd information_of(const Study& study, const JointFit& fit,
 infer::Observations observations_of(const Study& study, const Eigen::MatrixXd& nuisances,
                                     Loss loss) {
   infer::Observations all;
-  for (const ResidualTrial& t : study.trials) {
-    const Eigen::Vector3d r = residual_of(t, t.X_WP);  // late readings put right
-    all.measured.push_back(t.X_WP * Pose{r[0], r[1], r[2]});
-  }
+  all.difference = [&study](std::size_t i, const Pose& X_WP) {
+    return residual_of(study.trials[i], X_WP);
+  };
   all.whitener = study.whitener;
   all.columns = nuisances;
   all.least_scale = all.most_scale = 1;

@@ -113,6 +113,7 @@ Status settle(Predictor& predictor, bool tuned, Study* study) {
     study->trials[i].right = both[i] / 2 + apart[i];
     study->trials[i].left = both[i] / 2 - apart[i];
   }
+  study->use_predicted_ends(*ends.front());  // what sides do says how motions differ
   study->use_noise(study->noise);
   return {};
 }

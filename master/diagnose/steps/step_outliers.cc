@@ -85,9 +85,6 @@ Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation parti
     SpreadFit fit = row->fit(partial.study(), left, of.outlier_share());
     if (fit.gain < row->least_gain) continue;
     Study study = partial.study();
-    std::vector<Eigen::Vector3d> rest = left;
-    bend_by_session_gains(fit.sessions, &study, &rest);
-    fit = row->fit(study, rest, of.outlier_share());
     study.session_spread = fit.estimates.front().value;
     Eigen::MatrixXd nuisances = beside_sessions(study, partial.evidence->nuisances);
     partial.evidence = std::make_shared<const Evidence>(

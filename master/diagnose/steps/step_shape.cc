@@ -102,14 +102,14 @@ void predict_beside(const DiagnosisRequest& of, const Refit& refit, const Residu
 }
 
 // The smooth part's ends and what they leave; outliers are looked for about them.
-OutlierLesson lesson_about(const ResidualData& data, const JointFit& reported_fit,
-                           const ResidualFit& smooth, Residuals unseen) {
-  OutlierLesson lesson{data.ends, reported_fit.residuals, std::move(unseen), data.fold, data.learn};
-  if (smooth.field.empty()) return lesson;
+OutlierLesson lesson_about(const ResidualData& data, const Study& study, const Residuals& seen,
+                           const ResidualFit& smooth, const Residuals& unseen) {
+  OutlierLesson lesson{data.ends, seen, unseen, data.fold, data.learn};
   for (std::size_t i = 0; i < data.size(); ++i) {
-    const Eigen::Vector3d& r = reported_fit.residuals[i];
-    lesson.ends[i] = corrected_end(smooth.field, data.facts[i], data.ends[i]);
-    lesson.residuals[i] = local_difference(lesson.ends[i], data.ends[i] * Pose{r[0], r[1], r[2]});
+    const ResidualTrial& t = study.trials[i];
+    const Pose& end = lesson.ends[i] = corrected_end(smooth.field, data.facts[i], data.ends[i]);
+    lesson.residuals[i] = local_difference(end, end_with(t, data.ends[i], seen[i]));
+    lesson.unseen[i] = local_difference(end, end_with(t, end, unseen[i]));
   }
   return lesson;
 }
@@ -139,7 +139,7 @@ TriedShape try_shape(const DiagnosisRequest& of, const Refit& refit) {
   beside.use_residuals(after);
   tried.without_it = tried.with_it = scores_of(study, before, share);
   if (!fit.field.empty()) predict_beside(of, refit, after, &beside, &tried);
-  tried.lesson = lesson_about(data, reported_fit, fit, after);
+  tried.lesson = lesson_about(data, study, reported_fit.residuals, fit, after);
   tried.beside = std::move(beside);
   return tried;
 }

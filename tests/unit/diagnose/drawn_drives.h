@@ -19,6 +19,12 @@ struct Drawn {
   std::vector<Eigen::Vector3d> residuals;
   std::vector<Twist> left, right;  // that each side adds to a trial's motion
 
+  // What is left of trial `i` when it ends there, seen from where it would.
+  Eigen::Vector3d left_at(std::size_t i, const Pose& end) const {
+    ResidualTrial t = trials[i];
+    t.X_WE = t.X_WP * end;
+    return residual_of(t, t.X_WP);
+  }
   // Where trial `i` ends when its sides lose such shares, seen from where it would.
   Pose end(std::size_t i, double of_left, double of_right) const {
     const Twist motion = left[i] + right[i];
@@ -49,8 +55,8 @@ inline Drawn draw(std::uint64_t seed, double probability = 0, double loss = 0) {
     const double of_left = stream.bernoulli(probability) ? loss * stream.uniform() : 0;
     const double of_right = stream.bernoulli(probability) ? loss * stream.uniform() : 0;
     const Pose end = drawn.end(i, of_left, of_right) * Pose{r[0], r[1], r[2]};
-    drawn.residuals.push_back(local_difference({}, end) +
-                              probability * loss / 2 * (t.left + t.right));
+    t.X_WE = t.X_WP * end;
+    drawn.residuals.push_back(residual_of(t, t.X_WP) + probability * loss / 2 * (t.left + t.right));
     drawn.trials.push_back(t);
   }
   return drawn;

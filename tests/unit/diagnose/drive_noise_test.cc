@@ -9,6 +9,20 @@
 namespace gapfarm::drive_noise_test {
 namespace {
 
+// However far a side's speed is off, what it does is a straight line; and the end is known again.
+TEST(ResidualOf, IsALineInTheSidesSpeeds) {
+  const Drawn d = draw(1);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const ResidualTrial& t = d.trials[i];
+    for (const double loss : {-0.3, 0.2, 0.8}) {
+      const Pose end = d.end(i, loss, loss / 2);
+      const Eigen::Vector3d left = d.left_at(i, end);
+      EXPECT_LT((left + loss * t.left + loss / 2 * t.right).norm(), 1e-4) << i;
+      EXPECT_LT(local_difference(t.X_WP * end, end_with(t, t.X_WP, left)).norm(), 1e-9) << i;
+    }
+  }
+}
+
 // 600 trials show the drive to about 6 %: ten logs together are to be right within 5 %, which is
 // 2.5 standard errors, and each alone within 20 %.
 void expect_recovered(const std::vector<double>& ratios) {

@@ -51,6 +51,29 @@ TEST(Outliers, AFewStartsThatWereFarOffAreNamed) {
       << result->diagnosis.headline << listed(result->diagnosis.cautions);
 }
 
+// Noise of a side turns a robot that drives for eight seconds by tenths of a radian; it ends along
+// an arc then, which is no slip.
+TEST(Outliers, LongDrivesHaveNone) {
+  Problem problem = kinematic_log(120);
+  Stream stream({.run_seed = 8, .purpose = Purpose::kTest});
+  const double speed = problem.values[row_of(Srv1::kFullSpeed)];
+  const double width_m =
+      problem.values[row_of(Srv1::kTrackGauge)] + problem.values[row_of(Srv1::kContactLength)];
+  for (Trial& t : problem.log.trials) {
+    t.duration_s = 8;
+    const CommandSpec c = resolved_command(t, problem.commands);
+    const double left = 8 * speed * c.left * (1 + 0.02 * stream.normal()),
+                 right = 8 * speed * c.right * (1 + 0.02 * stream.normal());
+    t.X_WE = t.X_WS * exp({(left + right) / 2, 0, (right - left) / width_m}) *
+             Pose{0.002 * stream.normal(), 0.002 * stream.normal(), 0.01 * stream.normal()};
+  }
+  KinematicFarm farm;
+  const auto result = diagnose(farm, problem, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_EQ(result->diagnosis.verdict, Verdict::kNone)
+      << result->diagnosis.headline << listed(result->diagnosis.cautions);
+}
+
 // The left side slips now and then, and loses up to 40 % of its speed; chains stay chains.
 void let_slip(Problem* problem) {
   Stream stream({.run_seed = 6, .purpose = Purpose::kTest});

@@ -88,7 +88,7 @@ TEST(TrialsWithSlips, ScoreIsTheMixturesDensity) {
       const Eigen::Vector3d r = d.residuals[i] - 0.04 * (t.left + t.right);
       const double left = stream.bernoulli(0.2) ? 0.4 * stream.uniform() : 0;
       const double right = stream.bernoulli(0.2) ? 0.4 * stream.uniform() : 0;
-      const Eigen::Vector3d missed = local_difference(d.end(i, left, right), {r[0], r[1], r[2]});
+      const Eigen::Vector3d missed = r - d.left_at(i, d.end(i, left, right));
       density += std::exp(log_normal_density(missed, *cov)) / kDraws;
     }
     difference += std::abs(std::log(density) - judged[i].score) / 60;
@@ -112,7 +112,7 @@ TEST(TrialsWithSlips, ReportsSlipsFromOtherOutliers) {
   const SlipFit fit{.gain = 1, .probability = 0.05, .loss = 0.5, .noise = kTruth};
   for (std::size_t i = 0; i < 60; ++i) {
     if (i % 4 < 2) {
-      d.residuals[i] += local_difference({}, d.end(i, 0.4, 0));
+      d.residuals[i] += d.left_at(i, d.end(i, 0.4, 0));
     } else {
       d.residuals[i] += Eigen::Vector3d(0, 0.2, -0.6);
     }
@@ -133,9 +133,9 @@ TEST(TrialsWithSlips, FollowsGreatLosses) {
   Drawn d = draw(5);
   const SlipFit fit{.gain = 1, .probability = 0.05, .loss = 0.95, .noise = kTruth};
   for (std::size_t i = 0; i < 60; ++i) {
-    const Eigen::Vector3d& r = d.residuals[i];
-    d.residuals[i] = local_difference(
-        {}, d.end(i, i % 4 < 2 ? 0.87 : 0, i % 4 < 2 ? 0 : 0.87) * Pose{r[0], r[1], r[2]});
+    const Eigen::Vector3d r = d.residuals[i];
+    const Pose end = d.end(i, i % 4 < 2 ? 0.87 : 0, i % 4 < 2 ? 0 : 0.87);
+    d.residuals[i] = r + d.left_at(i, end);
   }
   const std::vector<SlipTrial> judged = trials_with_slips(d.trials, d.residuals, fit, 0, 0);
   for (std::size_t i = 0; i < 60; ++i) {
