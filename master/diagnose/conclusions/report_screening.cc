@@ -121,6 +121,10 @@ std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Scree
   for (Screened& row : rows) {
     const auto sizes = screening.detectable.find(row.effect);
     if (sizes != screening.detectable.end()) row.detectable_from = sizes->second;
+    const SpreadRow* spread = of.subject.effects->row(row.effect).spread;
+    if (spread != nullptr && spread->detectable != nullptr) {
+      row.detectable_from = spread->detectable(judged.named.study());
+    }
   }
   return rows;
 }

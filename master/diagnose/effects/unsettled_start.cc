@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/effects/catalogue.h"
+#include "common/math/laws.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/fit/estimate.h"
@@ -99,10 +100,24 @@ std::vector<double> scores_with_unsettled(const Study& study,
   return scores;
 }
 
+// Three turned starts are named, two hardly ever: blind logs with so many gained 15 to 29 nats, and
+// 5 to 11.  How many there are is Poisson's.
+constexpr double kFewestTurned = 3;
+
+std::vector<std::pair<std::string, double>> detectable_shares(const Study& study) {
+  const auto starts = static_cast<double>(std::ranges::count_if(study.trials, follows_move));
+  const double turned = chi_squared_quantile(2 * kFewestTurned, kDetectablePower) / 2;
+  if (!(turned < starts)) return {};
+  return {{"share", turned / starts}};
+}
+
 const SpreadRow kUnsettledSpread = {
-    "unsettled_start",
-    14,  // as of late readings, searched on a grid; null logs stay below 8
-    fit_unsettled, scores_with_unsettled, follows_move};
+    .effect = "unsettled_start",
+    .least_gain = 14,  // as of late readings, searched on a grid; null logs stay below 8
+    .fit = fit_unsettled,
+    .scores = scores_with_unsettled,
+    .contaminates = follows_move,
+    .detectable = detectable_shares};
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "master/diagnose/result/diagnosis.h"
@@ -46,6 +47,8 @@ struct SpreadRow {
   std::vector<Eigen::Vector3d> (*rest)(const Study& study,
                                        const std::vector<Eigen::Vector3d>& residuals,
                                        const SpreadFit& fit) = nullptr;
+  // Screened::detectable_from; null: not known.
+  std::vector<std::pair<std::string, double>> (*detectable)(const Study& study) = nullptr;
 };
 
 // What was found in readings, single trials or sessions rather than in the mean of all drives.
