@@ -56,12 +56,16 @@ std::optional<Twist> motion_to(const ResidualTrial& trial, const Pose& X_WP, dou
 
 }  // namespace
 
-Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP) {
-  const Eigen::Vector3d chord = local_difference(X_WP, trial.X_WE);
+Eigen::Vector3d difference_of(const ResidualTrial& trial, const Pose& X_WP, const Pose& X_WE) {
+  const Eigen::Vector3d chord = local_difference(X_WP, X_WE);
   const auto motion = motion_to(trial, X_WP, chord[2]);
-  if (!motion) return chord - trial.late;
-  const Twist moved = log(between(trial.X_WS, trial.X_WE), (*motion)[2] + chord[2]);
-  return end_slopes(*motion) * (moved - *motion) - trial.late;
+  if (!motion) return chord;
+  const Twist moved = log(between(trial.X_WS, X_WE), (*motion)[2] + chord[2]);
+  return end_slopes(*motion) * (moved - *motion);
+}
+
+Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP) {
+  return difference_of(trial, X_WP, trial.X_WE) - trial.late;
 }
 
 Pose end_with(const ResidualTrial& trial, const Pose& X_WP, const Eigen::Vector3d& residual) {

@@ -53,11 +53,13 @@ struct ResidualTrial {
 // Change of the predicted end for a unit change of both sides' gain.
 inline Eigen::Vector3d of_gain(const ResidualTrial& trial) { return trial.left + trial.right; }
 
-// Of the measured end, were it predicted there: how much farther the robot drove and turned all the
-// way, as it moves the predicted end.  Of a drive whose sides' gains changed by any amount it is
-// the sum of what they do, since they add to its motion (Murray, Li and Sastry 1994), while its end
-// leaves their straight lines along an arc.  Of pushes, and of whole turns, whose end says little
-// of the motion: the measured end in the predicted one's axes.
+// Of another end of a trial than the predicted one: how much farther the robot drove and turned all
+// the way, as it moves the predicted end.  Of a drive whose sides' gains changed by any amount it
+// is the sum of what they do, since they add to its motion (Murray, Li and Sastry 1994), while its
+// end leaves their straight lines along an arc.  Of pushes, and of whole turns, whose end says
+// little of the motion: the end in the predicted one's axes.
+Eigen::Vector3d difference_of(const ResidualTrial& trial, const Pose& X_WP, const Pose& X_WE);
+// Of the measured end, were it predicted there, what was late omitted.
 Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP);
 // The measured end of which that is the residual, were nothing late.
 Pose end_with(const ResidualTrial& trial, const Pose& X_WP, const Eigen::Vector3d& residual);

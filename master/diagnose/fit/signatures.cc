@@ -183,7 +183,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
     std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
     for (std::size_t j = 0; ends[k] && j < requests[k].trials.size(); ++j) {
       const std::size_t i = requests[k].trials[j];
-      d[i] = local_difference(ends_without[i], (*ends[k])[j]);
+      d[i] = difference_of(study.trials[i], ends_without[i], (*ends[k])[j]);
     }
     Signature s;
     s.effect = kPatchEffect;

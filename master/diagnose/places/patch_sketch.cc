@@ -205,14 +205,14 @@ std::size_t PatchSketch::first_across(const DrivenPath& driven, const Patch& pat
 }
 
 // Of the end, in the predicted end's axes.
-Eigen::Vector3d PatchSketch::shift_from(std::size_t first, const DrivenPath& driven,
-                                        const Patch& patch, const Steps& steps) const {
+Eigen::Vector3d PatchSketch::shift_from(std::size_t first, std::size_t trial, const Patch& patch,
+                                        const Steps& steps) const {
+  const DrivenPath& driven = driven_[trial];
   Placed X_WB = driven.X_WB[first];
   for (std::size_t k = first; k < kSteps; ++k) {
     X_WB = X_WB * steps[inside(contacts_at(X_WB * driven.half), patch)];
   }
-  const Pose shift = between(driven.X_WE, {X_WB.x, X_WB.y, X_WB.theta});
-  return {shift.x, shift.y, shift.theta};
+  return difference_of(study_.trials[trial], driven.X_WE, {X_WB.x, X_WB.y, X_WB.theta});
 }
 
 std::vector<Eigen::SparseVector<double>> PatchSketch::columns(
@@ -223,8 +223,7 @@ std::vector<Eigen::SparseVector<double>> PatchSketch::columns(
     const std::size_t first =
         study_.ignores(static_cast<Eigen::Index>(i)) ? kSteps : first_across(driven_[i], patch);
     for (std::size_t k = 0; k < steps.size() && first < kSteps; ++k) {
-      const Eigen::Vector3d mark =
-          study_.whitener[i] * shift_from(first, driven_[i], patch, (*steps[k])[i]);
+      const Eigen::Vector3d mark = study_.whitener[i] * shift_from(first, i, patch, (*steps[k])[i]);
       for (Eigen::Index c = 0; c < 3; ++c) {
         all[k].insertBack(static_cast<Eigen::Index>(3 * i) + c) = mark[c];
       }

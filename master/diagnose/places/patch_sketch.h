@@ -69,7 +69,7 @@ class PatchSketch {
   Contacts contacts_at(const Placed& X_WB) const;
   // The first step with a part of the contacts inside; kSteps: none.
   std::size_t first_across(const DrivenPath& driven, const Patch& patch) const;
-  Eigen::Vector3d shift_from(std::size_t first, const DrivenPath& driven, const Patch& patch,
+  Eigen::Vector3d shift_from(std::size_t first, std::size_t trial, const Patch& patch,
                              const Steps& steps) const;
   std::vector<Steps> steps(double ratio) const;  // by trial
   // Of all ratios' steps one column each.

@@ -159,7 +159,7 @@ double seam_position(const Study& study, const Regression& others, const Signatu
       }
       const Pose end = start * motions[i];
       const Pose s = shift(end, line);
-      d.push_back(local_difference(t.X_WP, {end.x + s.x, end.y + s.y, end.theta}));
+      d.push_back(difference_of(t, t.X_WP, {end.x + s.x, end.y + s.y, end.theta}));
     }
     Eigen::VectorXd mark = study.whiten(d);
     study.drop_ignored(mark);

@@ -194,7 +194,11 @@ Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& st
       if (table[fit.parameters[p].row].effect == name) own.push_back(static_cast<Eigen::Index>(p));
     }
     Eigen::MatrixXd columns(at_estimate.data.size(), static_cast<Eigen::Index>(own.size()) + 1);
-    columns.col(0) = study.whiten(differences(*ends[k], fit.ends));  // its contribution
+    std::vector<Eigen::Vector3d> contribution;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      contribution.push_back(difference_of(study.trials[i], (*ends[k])[i], fit.ends[i]));
+    }
+    columns.col(0) = study.whiten(contribution);
     columns.rightCols(columns.cols() - 1) = fit.jacobian(Eigen::all, own);
     at_estimate.data += columns.col(0);
     study.drop_ignored(columns);
