@@ -268,7 +268,7 @@ inline constexpr double kUnshown = 0.7;
 // the other runs' misses | chosen: real runs reach 4.2, one that is mirrored alone 50 and more | A
 // run is off by itself; of windows, half of the others' misses.
 inline constexpr double kFarRun = 10;
-// of the windows | measured: 0.13 at most of those of 136 robots, 0.33 and more where one command
+// of the windows | measured: 0.07 at most of those of 136 robots, 0.33 and more where one command
 // in twelve was lost | So many that are off by themselves are more than chance.
 inline constexpr double kFarShare = 0.2;
 // deviation of the motions | chosen: real runs of the cases leave 0.24 at most, with the commands
