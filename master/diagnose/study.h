@@ -120,6 +120,6 @@ std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at)
 
 // From the first ends to the others, in the axes of the first, divided by `scale`.
 std::vector<Eigen::Vector3d> differences(const std::vector<Pose>& from, const std::vector<Pose>& to,
-                                         double scale);
+                                         double scale = 1);
 
 }  // namespace gapfarm
