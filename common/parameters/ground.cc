@@ -223,7 +223,8 @@ void Rows::motors() {
   const double most = robot_.command == CommandKind::kDuties  ? 0.5
                       : robot_.command == CommandKind::kTwist ? 0.5
                                                               : 5;
-  add("dead_band", "-", 0, most, m.dead_band, "of a command, in its own unit",
+  add("dead_band", "-", 0, most, m.dead_band,
+      "of a command, in its own unit; of twists: m/s of a rim",
       [](GroundRobot& robot, double v) { robot.motors.dead_band = v; });
   if (robot_.command == CommandKind::kDuties) {
     size("full_speed", "rad/s", m.full_speed_rad_s.value_or(10), "of a wheel at duty 1",

@@ -91,10 +91,10 @@ struct RobotMotors {
   double lag_s = 0;         // first order, of the wheels; of a car: of its steering
   double drive_lag_s = 0;   // of a car: first order, of the wheels
   std::optional<double> acceleration_limit_m_s2;  // of the wheels' surface
-  double dead_band = 0;                           // in the command's own unit
-  std::optional<double> command_timeout_s;        // without a new row the wheels stop
-  std::optional<double> full_speed_rad_s;         // of a wheel at duty 1
-  std::optional<double> full_surface_speed_m_s;   // of its rim: complete_robot() makes it the above
+  double dead_band = 0;                     // in the command's own unit; of twists: m/s of each rim
+  std::optional<double> command_timeout_s;  // without a new row the wheels stop
+  std::optional<double> full_speed_rad_s;   // of a wheel at duty 1
+  std::optional<double> full_surface_speed_m_s;  // of its rim: complete_robot() makes it the above
 };
 
 // acceleration = max(throttle - zero, 0) (gain - back_emf v) - drag v - coulomb sign(v)

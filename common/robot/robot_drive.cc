@@ -127,7 +127,7 @@ void RobotDrive::twist_targets(double v, double omega, double vy) {
       surface = v * std::cos(w.heading_rad) + vy * std::sin(w.heading_rad) +
                 omega * std::copysign(arm, turn);
     }
-    targets_[i] = surface / radius * *w.radius_m;
+    targets_[i] = dead(surface) / radius * *w.radius_m;
   }
 }
 
@@ -271,7 +271,7 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
     return motions_;
   }
   if (robot_.command == CommandKind::kTwist) {
-    twist_targets(dead(at(commanded, v_)), at(commanded, omega_), at(commanded, vy_));
+    twist_targets(at(commanded, v_), at(commanded, omega_), at(commanded, vy_));
   } else {
     wheel_targets(commanded);
   }

@@ -50,7 +50,7 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // The same of windows that are no problem's.  Beside those of nominal_kinematics() these names may
 // stand: "travel" (ratio of all wheels), radius_row() of a wheel, "steering_left" and "_right"
 // (ratio of the angles that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain),
-// "dead_band" (the command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of
+// "dead_band" (RobotMotors), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of
 // the command lost a minute), "drift" (s that the clock of whoever logs the commands loses a
 // second), "rate" (the same of the robot's own clock, by which it also drives), "grip" (of cars:
 // logarithm of the acceleration to the side that the floor holds, m/s^2) with "slip_angle" (rad, of

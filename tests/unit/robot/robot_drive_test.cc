@@ -91,6 +91,18 @@ TEST(RobotDrive, ADeadBandIsTakenOff) {
   EXPECT_EQ(travel(sticky, {{0, {0.9, 0.9}}}, 1), 0);
 }
 
+TEST(RobotDrive, ADeadBandHoldsWheelsThatATwistTurns) {
+  GroundRobot sticky = robot();
+  sticky.command = CommandKind::kTwist;
+  sticky.channels = {"v", "omega"};
+  sticky.motors.dead_band = 0.1;
+  // A turn on the spot moves no wheel by less; beside a drive it takes as much off both.
+  const double half = *sticky.controller.wheel_separation_m / 2;
+  EXPECT_EQ(travel(sticky, {{0, {0, 0.09 / half}}}, 1), 0);
+  EXPECT_NEAR(travel(sticky, {{0, {0.5, 0}}}, 1), 0.4, 1e-9);
+  EXPECT_NEAR(travel(sticky, {{0, {0.1, -0.1 / half}}}, 1), 0.1, 1e-9);
+}
+
 TEST(RobotDrive, WheelsStopWhenCommandsDo) {
   GroundRobot careful = robot();
   careful.motors.command_timeout_s = 0.5;
