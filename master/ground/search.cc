@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -179,6 +180,40 @@ const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
   return *likeliest;
 }
 
+// What closes as much, alone, as a fault of the log has to.
+double closed_by_fault() { return 3 * std::log(kFaultShrinks); }
+
+// A hypothesis of values that every fit moves has nothing to gain by being free; beside a file that
+// stands as it is it may explain most.
+std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, const GroundWork& work,
+                                                const GroundSearch& search) {
+  const WindowFit& file = search.chain.front();
+  if (mean(search.fit.nats) - mean(file.nats) < closed_by_fault()) return std::nullopt;
+  std::optional<Candidate> best;
+  for (std::size_t i = 0; i < search.catalogue.size(); ++i) {
+    const auto is_held = [&](const KinematicRow& row) {
+      return row_index(search.fit.rows, row.name) >= 0;
+    };
+    const GroundHypothesis& hypothesis = search.catalogue[i];
+    if (hypothesis.freed.empty() || !std::ranges::all_of(hypothesis.freed, is_held)) continue;
+    Candidate c{{i, 0, {}}};
+    Eigen::VectorXd values;
+    const WindowFit alone = fitter.fit(with_freed({}, hypothesis, &values), {}, values);
+    c.held_out = fit_held_out(fitter, alone.rows, alone.values);
+    c.before = file;
+    c.held_out_gain = held_out_gain(fitter.windows(), c.held_out, file, work.seed);
+    c.offer.gain = alone.objective - fitter.hold({}, {}).objective;
+    if (c.held_out_gain.lo < closed_by_fault()) continue;
+    if (best && !(c.held_out_gain.mean > best->held_out_gain.mean)) continue;
+    values = search.fit.values;
+    const std::vector<FitRow> rows = with_freed(search.fit.rows, hypothesis, &values);
+    c.fit = fitter.fit(rows, {}, values);
+    c.may_be_named = true;
+    best = std::move(c);
+  }
+  return best;
+}
+
 // The best of the catalogue, when it is worth its name.
 bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
   std::vector<Candidate> tried;
@@ -222,7 +257,16 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   const auto chosen = std::ranges::find_if(tried, [&](const Candidate& c) {
     return c.competes && (!search->reference || c.gain() >= kShareOfBest * most);
   });
-  if (chosen == tried.end()) {
+  const bool none = chosen == tried.end();
+  if (!further && !search->reference) {
+    const auto within = best_within_tolerances(fitter, work, *search);
+    if (within && (none || within->held_out_gain.lo > chosen->held_out_gain.hi)) {
+      name_candidate(fitter.windows(), work, tried, *within, search);
+      emit_steps(work, *search);
+      return true;
+    }
+  }
+  if (none) {
     const auto best = std::ranges::find_if(tried, shown);
     if (best != tried.end()) {
       keep_if_best(search, std::move(best->held_out),

@@ -98,6 +98,8 @@ TEST(DiagnoseGround, FindsOneOfManyThings) {
       {kDifferential, "pose_scale", 1.05, "pose_scale", "ratio", 0.05},
       {kOmni, "turn", 1 / 1.06, "wheel_separation", "ratio", 0.06},
       {kOmni, "wheels.w2.radius", 0.95, "wheel_radius", "ratio", -0.05},
+      // Within what slipping tyres make of a marker, and all that is wrong.
+      {kCar, "marker_x", 0.08, "marker_offset", "x", 0.08},
       {kTricycle, "steering_left", 0.9, "steering_asymmetry", "ratio", -0.1},
       {kTricycle, "drive_lag", 0.2, "motor_lag", "tau", 0.2},
       {kCar, "steering_offset", 0.03, "steering_offset", "angle", 0.03},
