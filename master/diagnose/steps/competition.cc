@@ -149,8 +149,8 @@ std::vector<std::uint32_t> Competition::touched_by(const std::string& effect,
   return study_.subject->touched_by(of_.problem, study_, patch_of(disc));
 }
 
-infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
-                                       const Regression& explained) const {
+infer::Hypothesis Competition::of_mark(const EffectCandidate& mark, const Regression& explained,
+                                       const std::vector<EffectCandidate>& found_before) const {
   infer::Hypothesis h;
   h.name = mark.effect();
   h.coordinates = coordinates_of(h.name);
@@ -165,13 +165,16 @@ infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
   if (of_.subject.effects->row(kind_of(h.name)).marks != nullptr) {
     for (const double times : kFartherStarts) start_at(times);
   }
+  for (const EffectCandidate& before : found_before) {
+    if (before.effect() == h.name)
+      set_values(of_.table(), before.signature.fixed, &h.starts.emplace_back().at);
+  }
   if (!mark.signature.whole) return h;
-  infer::Start& start = h.starts.front();
   // What has a place does nothing elsewhere.
   h.promised = mark.gain;
   h.touched = [this, effect = h.name](const Overrides& at) { return touched_by(effect, at); };
-  start.reach = h.touched(start.at);
-  if (start.reach.empty()) h.starts.clear();
+  for (infer::Start& start : h.starts) start.reach = h.touched(start.at);
+  std::erase_if(h.starts, [](const infer::Start& start) { return start.reach.empty(); });
   return h;
 }
 

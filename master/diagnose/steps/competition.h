@@ -25,8 +25,9 @@ class Competition {
 
   // Every effect of the catalogue that is searched whatever slopes say, but for these.
   std::vector<infer::Hypothesis> of_rows(const std::set<std::string>& without) const;
-  // From where a first-order fit has its parameters.
-  infer::Hypothesis of_mark(const EffectCandidate& mark, const Regression& explained) const;
+  // From where a first-order fit has its parameters, and where a search before had them.
+  infer::Hypothesis of_mark(const EffectCandidate& mark, const Regression& explained,
+                            const std::vector<EffectCandidate>& found_before) const;
   std::map<std::string, double> values_of(const std::string& effect,
                                           const infer::Model& model) const;
   // Whitened rows, as if nothing were explained but by the model's parameters; 0 of ignored trials.

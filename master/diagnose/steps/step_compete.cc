@@ -94,10 +94,9 @@ class Selection {
   // `marks`: null where every hypothesis is searched from afar.  `configured`: the base before
   // anything was tuned.
   Selection(const DiagnosisRequest& of, const Study& study, const Competition& competition,
-            const Proposals* marks, const std::vector<Signature>& first,
-            const Overrides& configured)
-      : of_(of), study_(study), competition_(competition), marks_(marks), first_(first) {
-    for (const Signature& s : first) not_these_.insert(s.effect);
+            const Proposals* marks, const Explanation& before, const Overrides& configured)
+      : of_(of), study_(study), competition_(competition), marks_(marks), before_(before) {
+    for (const Signature& s : before.first) not_these_.insert(s.effect);
     if (marks != nullptr) terms_.effort = infer::Effort::kLocal;
     if (of.subject.base_moves) terms_.bases = {configured};
   }
@@ -152,7 +151,7 @@ class Selection {
     if (marks_ == nullptr) return competition_.of_rows(without);
     Regression explained = marks_->nothing_explained();
     explained.restart(competition_.unexplained(found_->model));
-    for (const Signature& s : first_) explained.add(s.columns);
+    for (const Signature& s : before_.first) explained.add(s.columns);
     for (const EffectCandidate& c : chosen) explained.add(c.signature.columns);
     ASSIGN_OR_RETURN(auto marks, marks_->candidates(explained, without, chosen));
     found_->detectable =
@@ -166,7 +165,7 @@ class Selection {
       if (most < least_gain_of(mark.effect(), study_, this->explained())) continue;
       if (not_these_.count(mark.effect())) continue;
       best = std::max(best, mark.gain);
-      hypotheses.push_back(competition_.of_mark(mark, explained));
+      hypotheses.push_back(competition_.of_mark(mark, explained, before_.chosen));
     }
     std::stable_sort(hypotheses.begin(), hypotheses.end(), [&](const auto& a, const auto& b) {
       return of_.subject.effects->place_in_catalogue(a.name) <
@@ -270,7 +269,7 @@ class Selection {
   const Study& study_;
   const Competition& competition_;
   const Proposals* marks_;
-  const std::vector<Signature>& first_;
+  const Explanation& before_;
   std::set<std::string> not_these_;  // explained before anything else, or dropped
   infer::Terms terms_;
   std::optional<Found> found_;
@@ -377,8 +376,7 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
     screening.catalogue = std::move(marks);
     if (Status s = screen_alone(of, found, &screening); !s) return s.error();
   }
-  Selection selection(of, study, competition, screening.catalogue.get(), found.first,
-                      configured.base);
+  Selection selection(of, study, competition, screening.catalogue.get(), found, configured.base);
   ASSIGN_OR_RETURN(auto selected, selection.run());
   if (screening.catalogue == nullptr) screening.rows = std::move(selected.rows);
   screening.steps = std::move(selected.steps);

@@ -128,22 +128,35 @@ Result<Screening> compete_from_free_base(const DiagnosisRequest& of, Explanation
   return compete(of, std::move(found));
 }
 
+// Whether something would have been named, were it sure.
+bool offers_enough(const Screening& screening, double least_gain) {
+  return std::ranges::any_of(screening.steps, [&](const SelectionRecord& step) {
+    return std::ranges::any_of(step.offered,
+                               [&](const auto& offer) { return offer.second >= least_gain; });
+  });
+}
+
 // Alone the base may have been tuned to where slopes say nothing of it beside what moves the robot.
 // Where what competes beside them leaves too much to be named, base and hypotheses are searched
-// together; with so much room they have to leave nothing.
+// together; with so much room they have to leave nothing, where anything else is named.
 Result<Screening> compete_from_both(const DiagnosisRequest& of, Explanation beside) {
   auto held = compete(of, beside);
   if (!held || of.subject.base_moves || of.options.keep_base) return held;
-  if (held->found.chosen.empty()) return held;
-  ASSIGN_OR_RETURN(const auto beside_held, judge(of, *held));
-  if (beside_held.verdict != Verdict::kUnknown) return held;
+  if (held->found.chosen.empty()) {
+    if (!offers_enough(*held, of.subject.least_gain)) return held;
+  } else {
+    ASSIGN_OR_RETURN(const auto beside_held, judge(of, *held));
+    if (beside_held.verdict != Verdict::kUnknown) return held;
+  }
   beside.frees_base = true;
   auto freed = compete_from_free_base(of, std::move(beside));
   if (!freed && freed.error().code == ErrorCode::kSimulation) return held;
   if (!freed) return freed;
   if (freed->found.chosen.empty() || base_is_on_bounds(freed->found)) return held;
   ASSIGN_OR_RETURN(const auto beside_freed, judge(of, *freed));
-  return beside_freed.verdict == Verdict::kEffect ? std::move(freed) : std::move(held);
+  const bool better = beside_freed.verdict == Verdict::kEffect ||
+                      (held->found.chosen.empty() && beside_freed.verdict != Verdict::kUnknown);
+  return better ? std::move(freed) : std::move(held);
 }
 
 Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explanation& found) {
