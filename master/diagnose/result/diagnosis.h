@@ -161,11 +161,12 @@ struct DiagnosedTrial {
   int place_in_run = 0;
   bool held_out = false;
   Pose X_WS;
-  Pose measured, tuned, final_;                    // X_SE
-  Eigen::Matrix3d tuned_cov, final_cov;            // in the predicted end's own axes
-  Eigen::Vector3d tuned_residual, final_residual;  // m, m, rad, in the predicted end's own axes
-  double tuned_score = 0, final_score = 0;         // nats
-  std::vector<double> covariates;                  // one a Diagnosis::shown
+  Pose measured, tuned, final_;  // X_SE
+  // m, m, rad, in the predicted end's own axes.
+  Eigen::Matrix3d tuned_cov = Eigen::Matrix3d::Zero(), final_cov = tuned_cov;
+  Eigen::Vector3d tuned_residual = Eigen::Vector3d::Zero(), final_residual = tuned_residual;
+  double tuned_score = 0, final_score = 0;  // nats
+  std::vector<double> covariates;           // one a Diagnosis::shown
 };
 
 // One real drive beside the simulated ones, from its measured start.  A path that is not known is

@@ -3,7 +3,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "common/json/json.h"
+#include "common/base/ranges.h"
 #include "master/diagnose/result/json_fields.h"
 #include "master/io/log_checks/log_checks.h"
 
@@ -101,12 +101,10 @@ constexpr auto kDrive = [](auto& v, auto& row) {
   v.if_any("final", row.final_);
 };
 constexpr auto kShown = [](auto& v, auto& row) { FIELDS(key, label, matches); };
+constexpr auto kLabels = [](auto& v, auto& row) { IF_ANY(ends, residuals, x, y); };
 // How they describe the trials, where not of driven commands.
 constexpr auto kPictures = [](auto& v, auto& row) {
-  v.if_any("ends", row.labels.ends);
-  v.if_any("residuals", row.labels.residuals);
-  v.if_any("x", row.labels.x);
-  v.if_any("y", row.labels.y);
+  kLabels(v, row.labels);
   v.list_if_any("shown", row.shown, kShown);
 };
 constexpr auto kGap = [](auto& v, auto& row) {
@@ -139,6 +137,75 @@ constexpr auto kLast = [](auto& v, auto& row) {
   v.object_if_any("pictures", row, kPictures);
 };
 
+constexpr const char* kAllCommands = "all";
+
+std::vector<std::string> covariate_names() {
+  return mapped(residual_covariates(), [](const auto& c) { return std::string(c.name); });
+}
+
+constexpr auto kTerm = [](auto& v, auto& row) {
+  v.name_of("frame", row.frame, residual_frame_names());
+  FIELDS(by_drive);
+  v.name_of("covariates", row.covariates, covariate_names());
+  FIELDS(lengths, centres);
+  v.by_key("weights", row.weights, &ResidualWeights::command, &ResidualWeights::shifts);
+};
+constexpr auto kOutliers = [](auto& v, auto& row) {
+  OutlierDrives values = row;  // what is written may not be pointed into
+  v.name_of("kind", values.kind, outlier_kind_names());
+  for (const auto& [key, value] : outlier_values(values)) v.field(key, *value);
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(row)>>) row = values;
+};
+constexpr auto kFound = [](auto& v, auto& row) {
+  FIELDS(text, gained, gained_lo, gained_hi, gap_before, gap_after, closed, closed_lo, closed_hi);
+};
+
+Json residual_json(const FoundResidual& residual) {
+  Json json = {{"kept", !residual.correction.empty()}};
+  json.update(FieldWriter::written(residual, kFound));
+  ResidualField terms = residual.correction.field;
+  for (ResidualTerm& term : terms) {
+    for (ResidualWeights& w : term.weights)
+      w.command = w.command.empty() ? kAllCommands : w.command;
+  }
+  json["terms"] = FieldWriter::list(terms, kTerm);
+  if (residual.correction.outliers) {
+    json["strays"] = FieldWriter::written(*residual.correction.outliers, kOutliers);
+    json["strays"]["chances"] = residual.chances;
+  }
+  return json;
+}
+
+// Whatever a model would refuse is refused here, too; its commands are those that have weights.
+Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
+  std::string error;
+  FoundResidual found;
+  Fields fields(json, "residual", error);
+  kFound(fields, found);
+  fields.list("terms", found.correction.field, kTerm);
+  if (json.contains("strays")) {
+    Fields outliers(json["strays"], "residual.strays", error);
+    kOutliers(outliers, found.correction.outliers.emplace());
+    outliers.field("chances", found.chances);
+    const auto is_chance = [](double chance) { return chance >= 0 && chance <= 1; };
+    if (!std::ranges::all_of(found.chances, is_chance))
+      outliers.complain("chances", found.chances, "numbers in [0, 1]");
+  }
+  if (!error.empty()) return Error{error};
+  std::vector<std::string> commands;
+  for (ResidualTerm& term : found.correction.field) {
+    for (ResidualWeights& w : term.weights) {
+      if (w.command == kAllCommands) w.command.clear();
+      if (!w.command.empty()) commands.push_back(w.command);
+    }
+  }
+  Status sound = check_residual(found.correction.field, commands);
+  if (sound && found.correction.outliers) sound = check_outliers(*found.correction.outliers);
+  if (!sound) return Error{"diagnosis.json: " + sound.error().message};
+  *residual = std::move(found);
+  return {};
+}
+
 }  // namespace
 
 Json sanity_json(const std::vector<SanityFinding>& findings) {
@@ -154,10 +221,7 @@ Json drives_json(const std::vector<ShownDrive>& drives) {
 }
 
 const char* verdict_name(Verdict verdict) {
-  for (const auto& [value, name] : kVerdicts) {
-    if (value == verdict) return name;
-  }
-  return "unknown";
+  return find_by(kVerdicts, verdict, &std::pair<Verdict, const char*>::first)->second;
 }
 
 Json summary_json(const Diagnosis& diagnosis) {
@@ -196,14 +260,12 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   Diagnosis diagnosis;
   std::string verdict;
   root.field("verdict", verdict);
-  bool known = false;
-  for (const auto& [value, name] : kVerdicts) {
-    if (verdict == name) diagnosis.verdict = value, known = true;
-  }
-  if (error.empty() && !known) {
+  const auto* known = find_by(kVerdicts, verdict, &std::pair<Verdict, const char*>::second);
+  if (error.empty() && known == nullptr) {
     root.complain("verdict", json["verdict"], "effect, none, unknown, effect+unknown or unusable");
   }
   if (!error.empty()) return Error{error};
+  diagnosis.verdict = known->first;
   kDiagnosis(root, diagnosis);
   kLast(root, diagnosis);
   if (!error.empty()) return Error{error};

@@ -32,10 +32,6 @@ Json trials_json(const Diagnosis& diagnosis, int digits = 0);
 Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
                                                  const std::vector<ShownCovariate>& shown);
 
-// The correction without a cause; and back.
-Json residual_json(const FoundResidual& residual);
-Status read_residual(const Json& json, std::optional<FoundResidual>* residual);
-
 Json parameters_json(const std::vector<ParameterRow>& rows);
 Json drives_json(const std::vector<ShownDrive>& drives);
 

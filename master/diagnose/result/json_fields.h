@@ -8,9 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "common/base/ranges.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/json/matrix.h"
@@ -31,8 +33,8 @@ class Fields {
   }
 
   template <class T>
-  void field(const char* key, T& field) {
-    if (!json_.is_object() || !json_.contains(key)) {
+  void field(const std::string& key, T& field) {
+    if (!json_.contains(key)) {
       return fail(name(key) + " is missing; was this written by gapfarm diagnose?");
     }
     convert(key, json_[key], field);
@@ -41,13 +43,13 @@ class Fields {
   // A value that stands elsewhere, in a table's row.
   template <class T>
   void cell(const std::string& column, const Json& json, T& field) {
-    convert(column.c_str(), json, field);
+    convert(column, json, field);
   }
 
   // A field that an earlier version, or another program, may omit.
   template <class T>
   void later(const char* key, T& field) {
-    if (json_.is_object() && json_.contains(key)) convert(key, json_[key], field);
+    if (json_.contains(key)) convert(key, json_[key], field);
   }
   // One that is written only where there is something in it.
   template <class T>
@@ -63,14 +65,19 @@ class Fields {
       if (found == name_of(value)) field = value;
     }
   }
-  // Rows in an object, each under its own key, which `key_of` is.
-  template <class Row, class Key, class Describe>
-  void by_key(const char* key, std::vector<Row>& rows, Key Row::*key_of, const Describe& describe) {
-    for_each(key, [&](const auto& item, const std::string& path, const std::string& item_key) {
+  // Rows in an object, each under its own key, which `key_of` is: described, or values of one
+  // member.
+  template <class Row, class Key, class What>
+  void by_key(const char* key, std::vector<Row>& rows, Key Row::*key_of, const What& what) {
+    for_each(key, [&](const Json& item, const std::string& path, const std::string& item_key) {
       Row& row = rows.emplace_back();
       row.*key_of = item_key;
-      Fields fields(item, path, error_);
-      describe(fields, row);
+      if constexpr (std::is_member_object_pointer_v<What>) {
+        convert(std::string(key) + "." + item_key, item, row.*what);
+      } else {
+        Fields fields(item, path, error_);
+        what(fields, row);
+      }
     });
   }
   void by_key(const char* key, std::vector<std::pair<std::string, double>>& numbers) {
@@ -79,113 +86,88 @@ class Fields {
   }
   template <class Row, class Describe>
   void list(const char* key, std::vector<Row>& rows, const Describe& describe) {
-    for_each(key, [&](const auto& item, const std::string& path, const std::string&) {
+    for_each(key, [&](const Json& item, const std::string& path, const std::string&) {
       Fields fields(item, path, error_);
       describe(fields, rows.emplace_back());
     });
   }
-
   template <class Row, class Describe>
   void list_if_any(const char* key, std::vector<Row>& rows, const Describe& describe) {
     list(key, rows, describe);
-  }
-
-  // Numbers, texts or lists in an object, each under its own key.
-  template <class Row, class Key, class Value>
-  void by_key(const char* key, std::vector<Row>& rows, Key Row::*key_of, Value Row::*value_of) {
-    for_each(key, [&](const auto& item, const std::string&, const std::string& item_key) {
-      Row& row = rows.emplace_back();
-      row.*key_of = item_key;
-      convert((std::string(key) + "." + item_key).c_str(), item, row.*value_of);
-    });
   }
   // One of these names, or several, by their places.
   template <class Place>
   void name_of(const char* key, Place& field, const std::vector<std::string>& names) {
     std::string found;
     this->field(key, found);
-    field = place_of(key, found, names, field);
+    field = static_cast<Place>(place_of(key, found, names));
   }
   void name_of(const char* key, std::vector<std::size_t>& field,
                const std::vector<std::string>& names) {
     std::vector<std::string> found;
     this->field(key, found);
-    for (const std::string& name : found) {
-      field.push_back(place_of(key, name, names, std::size_t{0}));
-    }
+    field = mapped(found, [&](const std::string& name) { return place_of(key, name, names); });
   }
   template <class Row, class Describe>
   void object(const char* key, Row& row, const Describe& describe) {
-    if (!json_.is_object() || !json_.contains(key)) return fail(name(key) + " is missing");
+    if (!json_.contains(key)) return fail(name(key) + " is missing");
     object_if_any(key, row, describe);
   }
   template <class Row, class Describe>
   void object_if_any(const char* key, Row& row, const Describe& describe) {
-    if (!json_.is_object() || !json_.contains(key)) return;
+    if (!json_.contains(key)) return;
     Fields fields(json_[key], name(key), error_);
     if (error_.empty()) describe(fields, row);
   }
 
-  // Calls each(item, path) for the list under `key`, when there is one.
-  template <class Each>
-  void for_each(const char* key, const Each& each) {
-    if (!json_.is_object() || !json_.contains(key)) return;
-    const Json& list = json_[key];
-    if (!list.is_array() && !list.is_object()) return complain(key, list, "a list");
-    std::size_t index = 0;
-    for (const auto& [item_key, item] : list.items()) {
-      const std::string place =
-          list.is_array() ? "[" + std::to_string(index++) + "]" : "." + item_key;
-      each(item, name(key) + place, item_key);
-    }
-  }
-
-  std::string name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
   void complain(const std::string& key, const Json& found, const char* expected) {
     fail(name(key) + " is " + json_text(found).substr(0, 60) + ", expected " + expected);
   }
-  std::string& error() { return error_; }
 
  private:
-  void convert(const char* key, const Json& json, double& field) {
-    if (json.is_null()) {
-      field = std::numeric_limits<double>::quiet_NaN();
-    } else if (json.is_number()) {
-      field = json.get<double>();
-    } else {
-      complain(key, json, "a number");
+  std::string name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
+  // Calls each(item, path, key) for what stands under `key`, when there is something.
+  template <class Each>
+  void for_each(const char* key, const Each& each) {
+    if (!json_.contains(key)) return;
+    const Json& list = json_[key];
+    if (!list.is_array() && !list.is_object()) return complain(key, list, "a list");
+    for (const auto& [item_key, item] : list.items()) {
+      each(item, name(key) + (list.is_array() ? "[" + item_key + "]" : "." + item_key), item_key);
     }
   }
-  void convert(const char* key, const Json& json, std::optional<double>& field) {
-    convert(key, json, field.emplace());
-  }
-  template <std::integral Count>
-  void convert(const char* key, const Json& json, Count& field) {
-    if constexpr (std::same_as<Count, bool>) {
+
+  // Numbers, counts, texts, and what is so or is not.
+  template <class T>
+  void convert(const std::string& key, const Json& json, T& field) {
+    if constexpr (std::same_as<T, double>) {
+      if (json.is_null()) return void(field = std::numeric_limits<double>::quiet_NaN());
+      if (!json.is_number()) return complain(key, json, "a number");
+    } else if constexpr (std::same_as<T, std::string>) {
+      if (!json.is_string()) return complain(key, json, "a text");
+    } else if constexpr (std::same_as<T, bool>) {
       if (!json.is_boolean()) return complain(key, json, "true or false");
-    } else if (std::unsigned_integral<Count> ? !json.is_number_unsigned()
-                                             : !json.is_number_integer()) {
+    } else if (std::unsigned_integral<T> ? !json.is_number_unsigned() : !json.is_number_integer()) {
       return complain(key, json, "a count");
     }
-    field = json.get<Count>();
+    field = json.get<T>();
   }
-  void convert(const char* key, const Json& json, std::string& field) {
-    if (!json.is_string()) return complain(key, json, "a text");
-    field = json.get<std::string>();
+  void convert(const std::string& key, const Json& json, std::optional<double>& field) {
+    convert(key, json, field.emplace());
   }
   template <class T>
-  void convert(const char* key, const Json& json, std::vector<T>& field) {
+  void convert(const std::string& key, const Json& json, std::vector<T>& field) {
     if (!json.is_array()) return complain(key, json, "a list");
     field.clear();
     for (const Json& item : json) convert(key, item, field.emplace_back());
   }
-  void convert(const char* key, const Json& json, PathSample& sample) {
+  void convert(const std::string& key, const Json& json, PathSample& sample) {
     std::vector<double> values;
     convert(key, json, values);
     if (values.size() != 4) return complain(key, json, "[t s, x m, y m, heading rad]");
     sample = {values[0], {values[1], values[2], values[3]}};
   }
-  void convert(const char* key, const Json& json, Eigen::MatrixXd& field) {
+  void convert(const std::string& key, const Json& json, Eigen::MatrixXd& field) {
     std::vector<std::vector<double>> rows;
     convert(key, json, rows);
     if (!rows.empty()) field.resize(rows.size(), rows.front().size());
@@ -194,13 +176,13 @@ class Fields {
       field.row(k) = Eigen::Map<const Eigen::RowVectorXd>(rows[k].data(), field.cols());
     }
   }
-  template <class Place>
-  Place place_of(const char* key, const std::string& found, const std::vector<std::string>& names,
-                 Place otherwise) {
-    const auto at = std::find(names.begin(), names.end(), found);
-    if (at != names.end()) return static_cast<Place>(at - names.begin());
+  // 0 where it is none of them.
+  std::size_t place_of(const char* key, const std::string& found,
+                       const std::vector<std::string>& names) {
+    const auto at = std::ranges::find(names, found);
+    if (at != names.end()) return at - names.begin();
     complain(key, found, "one of its names");
-    return otherwise;
+    return 0;
   }
   void fail(const std::string& sentence) {
     if (error_.empty()) error_ = "diagnosis.json: " + sentence;

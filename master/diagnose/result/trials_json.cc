@@ -53,18 +53,11 @@ void visit_columns(Trial& trial, const Visit& visit) {
   visit("final_score", trial.final_score);
 }
 
-DiagnosedTrial blank_trial() {
-  DiagnosedTrial trial;
-  trial.tuned_cov = trial.final_cov = Eigen::Matrix3d::Zero();
-  trial.tuned_residual = trial.final_residual = Eigen::Vector3d::Zero();
-  return trial;
-}
-
 }  // namespace
 
 Json trials_json(const Diagnosis& diagnosis, int digits) {
   Json columns = Json::array();
-  const DiagnosedTrial blank = blank_trial();
+  const DiagnosedTrial blank{};
   visit_columns(blank, [&](const std::string& name, const auto&) { columns.push_back(name); });
   for (const ShownCovariate& shown : diagnosis.shown) columns.push_back(shown.key);
   Json rows = Json::array();
@@ -104,7 +97,7 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
       return Error{"diagnosis.json: " + where + " must be a list of " +
                    std::to_string(expected.size()) + " cells"};
     }
-    DiagnosedTrial trial = blank_trial();
+    DiagnosedTrial& trial = trials.emplace_back();
     trial.covariates.resize(shown.size());
     std::size_t column = 0;
     std::string error;
@@ -118,7 +111,6 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
     for (Eigen::Matrix3d* cov : {&trial.tuned_cov, &trial.final_cov}) {
       cov->triangularView<Eigen::StrictlyLower>() = cov->transpose();
     }
-    trials.push_back(std::move(trial));
   }
   return trials;
 }
