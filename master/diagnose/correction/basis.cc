@@ -25,20 +25,15 @@ constexpr double kBeyond = 0.1;  // that a row goes on past the last reading, of
 Eigen::VectorXd scaled_point(const ResidualTerm& term, const LoggedMotion& facts,
                              const Pose& X_WR) {
   const auto known = residual_covariates();
-  Eigen::VectorXd point(2 * term.covariates.size());
-  point.setZero();
+  Eigen::Matrix2Xd point(2, term.covariates.size());
   for (std::size_t j = 0; j < term.covariates.size(); ++j) {
     const ResidualCovariate& covariate = known[term.covariates[j]];
     const double value = covariate.value(facts, X_WR);
-    const auto at = static_cast<Eigen::Index>(2 * j);
-    if (covariate.cyclic) {
-      point[at] = std::cos(value) / term.lengths[j];
-      point[at + 1] = std::sin(value) / term.lengths[j];
-    } else {
-      point[at] = value / term.lengths[j];
-    }
+    point.col(j) = covariate.cyclic ? Eigen::Vector2d(std::cos(value), std::sin(value))
+                                    : Eigen::Vector2d(value, 0);
+    point.col(j) /= term.lengths[j];
   }
-  return point;
+  return point.reshaped();
 }
 
 Eigen::Matrix3d noise_of(const Eigen::Matrix3d& whitener) {
@@ -46,22 +41,17 @@ Eigen::Matrix3d noise_of(const Eigen::Matrix3d& whitener) {
 }
 
 std::vector<std::size_t> rows_of_covariates(std::initializer_list<std::string_view> names) {
-  std::vector<std::size_t> rows;
   const auto known = residual_covariates();
-  for (const std::string_view name : names) {
-    const auto at = std::ranges::find(known, name, &ResidualCovariate::name);
-    rows.push_back(static_cast<std::size_t>(at - known.begin()));
-  }
-  return rows;
+  return mapped(names, [&](std::string_view name) -> std::size_t {
+    return std::ranges::find(known, name, &ResidualCovariate::name) - known.begin();
+  });
 }
 
 using Lengths = std::vector<std::vector<double>>;
 
 // One and the same for so many covariates.
 Lengths alike(std::size_t count, std::initializer_list<double> lengths) {
-  Lengths all;
-  for (const double length : lengths) all.emplace_back(count, length);
-  return all;
+  return mapped(lengths, [&](double length) { return std::vector<double>(count, length); });
 }
 
 }  // namespace
@@ -100,6 +90,15 @@ double ResidualBasis::value(std::size_t covariate, const Place& place) const {
   return residual_covariates()[covariate].value(data_.facts[place.trial], place.X_WR);
 }
 
+Interval ResidualBasis::range_of(std::size_t covariate, const std::vector<Place>& among) const {
+  Interval range = {INFINITY, -INFINITY};
+  for (const Place& place : among) {
+    range.lower = std::min(range.lower, value(covariate, place));
+    range.upper = std::max(range.upper, value(covariate, place));
+  }
+  return range;
+}
+
 std::vector<ResidualBasis::Place> ResidualBasis::places(const std::vector<bool>& seen) const {
   std::vector<Place> places;
   for (std::size_t i = 0; i < data_.size(); ++i) {
@@ -111,21 +110,16 @@ std::vector<ResidualBasis::Place> ResidualBasis::places(const std::vector<bool>&
 }
 
 void ResidualBasis::set_units() {
-  std::vector<double> drives, noises[3];
-  for (std::size_t i = 0; i < data_.size(); ++i) {
-    drives.push_back(drive_s(data_.facts[i]));
-    const Eigen::Matrix3d noise = noise_of(data_.whiteners[i]);
-    for (int k = 0; k < 3; ++k) noises[k].push_back(std::sqrt(noise(k, k)));
+  const auto noises = mapped(data_.whiteners, noise_of);
+  for (int k = 0; k < 3; ++k) {
+    unit_[k] = median(mapped(noises, [&](const auto& noise) { return std::sqrt(noise(k, k)); }));
   }
-  for (int k = 0; k < 3; ++k) unit_[k] = median(noises[k]);
   unit_[0] = unit_[1] = std::max(unit_[0], unit_[1]);
-  if (term_.by_drive) unit_ /= std::max(1e-6, median(drives));
+  if (term_.by_drive) unit_ /= std::max(1e-6, median(mapped(data_.facts, drive_s)));
   if (term_.frame == ResidualFrame::kMotion) {
-    std::vector<double> distances, turns;
-    for (const Eigen::Matrix3d& motion : turned_) {
-      distances.push_back(std::hypot(motion(0, 0), motion(1, 1)));
-      turns.push_back(std::abs(motion(2, 2)));
-    }
+    using M = const Eigen::Matrix3d&;
+    const auto distances = mapped(turned_, [](M m) { return std::hypot(m(0, 0), m(1, 1)); });
+    const auto turns = mapped(turned_, [](M m) { return std::abs(m(2, 2)); });
     unit_.head<2>() /= std::max(1e-3, median(distances));
     unit_[2] /= std::max(1e-2, quantile(turns, 0.75));
   }
@@ -142,11 +136,7 @@ void ResidualBasis::place_lengths(const std::vector<Place>& among,
                                   const std::vector<double>& shares) {
   const auto known = residual_covariates();
   for (const std::size_t row : term_.covariates) {
-    double least = INFINITY, most = -INFINITY;
-    for (const Place& place : among) {
-      least = std::min(least, value(row, place));
-      most = std::max(most, value(row, place));
-    }
+    const auto [least, most] = range_of(row, among);
     const bool flag = std::string_view(known[row].name).ends_with("_reversed") ||
                       std::string_view(known[row].name) == "moved";
     const double range = known[row].cyclic || flag ? 1 : most - least;
@@ -196,11 +186,7 @@ void ResidualBasis::place_edge(const std::vector<Place>& among, const Residuals&
   const std::optional<double> edge = best_edge(data_, residuals, seen, row);
   useful_ = edge.has_value();
   if (!edge) return;
-  double least = INFINITY, most = -INFINITY;
-  for (const Place& place : among) {
-    least = std::min(least, value(row, place));
-    most = std::max(most, value(row, place));
-  }
+  const auto [least, most] = range_of(row, among);
   const double beyond = kBeyond * (most - least);
   const bool up = most - *edge < *edge - least;
   const double reach = up ? most + beyond - *edge : *edge - least + beyond;

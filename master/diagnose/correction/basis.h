@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/ranges.h"
 #include "common/residual/field.h"
 #include "master/diagnose/correction/fit.h"
 
@@ -69,6 +70,7 @@ class ResidualBasis {
   void set_units();
   void set_features();
   double value(std::size_t covariate, const Place& place) const;
+  Interval range_of(std::size_t covariate, const std::vector<Place>& among) const;
   Lesson lesson_of(std::size_t group, const Residuals& residuals,
                    const std::vector<bool>& learn) const;
   Eigen::VectorXd pull_of(const Lesson& lesson, const Eigen::MatrixXd& weights) const;

@@ -24,14 +24,10 @@ class FieldSearch {
     for (std::size_t i = 0; i < data.size(); ++i) learn_[i] = seen[i] && data.learn[i];
     for (std::size_t f = 0; f < data.folds(); ++f) {
       std::vector<bool> others = learn_, own = seen;
-      std::size_t count = 0;
       for (std::size_t i = 0; i < data.size(); ++i) {
-        const bool in = data.fold[i] == f;
-        if (in) others[i] = false;
-        own[i] = in && seen[i];
-        count += own[i];
+        (data.fold[i] == f ? others : own)[i] = false;
       }
-      if (count > 0) folds_.push_back({std::move(others), std::move(own), residuals});
+      if (contains(own, true)) folds_.push_back({std::move(others), std::move(own), residuals});
     }
   }
 
@@ -143,11 +139,10 @@ double gain_at(const std::vector<Crossing>& drives, double edge) {
     }
     shift += inverse * pull;
   }
-  double gain = 0;
-  for (const auto& [c, beyond] : crossing) {
-    gain += outlier_nats(c->whitened - beyond * (c->axes * shift)) - outlier_nats(c->whitened);
-  }
-  return gain;
+  return sum_of(crossing, [&](const auto& drive) {
+    const auto& [c, beyond] = drive;
+    return outlier_nats(c->whitened - beyond * (c->axes * shift)) - outlier_nats(c->whitened);
+  });
 }
 
 }  // namespace

@@ -254,7 +254,7 @@ std::optional<OutlierFit> fit_outliers(const OutlierData& data, const Residuals&
       }
       for (const NoiseEstimate& noise : noises) {
         const double nats = plain.nats(noise, &outliers);
-        if (nats > first.nats) first = {outliers, noise, nats, 0};
+        if (nats > first.nats) first = {outliers, noise, nats};
       }
     }
     OutlierFit fit = climbed({data, residuals, learn, &first.outliers}, kMostEvaluations, first);
@@ -262,9 +262,8 @@ std::optional<OutlierFit> fit_outliers(const OutlierData& data, const Residuals&
   }
   // The noise has more than one hill: what turns a robot may be a side's drive or a reading.
   Search other = search_from(best->noise, nullptr);
-  best->gain = best->nats - std::max(without, climb(plain, kMostEvaluations, &other));
-  if (best->gain < least_gain) best.reset();
-  return best;
+  const double gain = best->nats - std::max(without, climb(plain, kMostEvaluations, &other));
+  return gain < least_gain ? std::nullopt : best;
 }
 
 }  // namespace gapfarm

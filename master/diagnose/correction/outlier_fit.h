@@ -26,7 +26,6 @@ struct OutlierFit {
   OutlierDrives outliers;
   NoiseEstimate noise;
   double nats = 0;  // over the trials that it learned from
-  double gain = 0;  // over the best noise alone
 };
 
 // Log score (nats) of a trial's residual (measured end minus predicted, in the latter's axes).
@@ -38,7 +37,7 @@ double outlier_chance(const OutlierData& data, std::size_t trial, const Eigen::V
                       const OutlierFit& fit);
 
 // The kind that explains most of the residuals of the trials with learn[i]; none that explains
-// `least_gain` nats: nothing.
+// `least_gain` nats over the best noise alone: nothing.
 std::optional<OutlierFit> fit_outliers(const OutlierData& data, const Residuals& residuals,
                                        const std::vector<bool>& learn, const NoiseEstimate& start,
                                        double least_gain);

@@ -95,7 +95,7 @@ TEST(OutlierFit, FindsWhatOutliersAndHowOften) {
     EXPECT_NEAR(found->outliers.least, truth.least, 0.15 + 0.1 * std::abs(truth.least));
     EXPECT_NEAR(found->outliers.most, truth.most, 0.15 + 0.1 * std::abs(truth.most));
     EXPECT_NEAR(found->outliers.rest, truth.rest, 0.02);
-    const OutlierFit perfect{truth, kTrue, 0, 0};
+    const OutlierFit perfect{truth, kTrue, 0};
     const NoiseEstimate wide = {{0.004, 0.03}, 0.2, 0.05};
     OutlierFit none = perfect;
     none.outliers.share = 1e-9;
@@ -110,7 +110,7 @@ TEST(OutlierFit, FindsWhatOutliersAndHowOften) {
 TEST(OutlierFit, ReportsWhichTheyWere) {
   const OutlierDrives truth{OutlierKind::kLate, 0.25, 0.3, 0.32, 0, 0, 0, 0};
   const OutlierLog log = draw_outliers(11, 400, &truth);
-  const OutlierFit perfect{truth, kTrue, 0, 0};
+  const OutlierFit perfect{truth, kTrue, 0};
   double late = 0, marked = 0, both = 0;
   for (std::size_t i = 0; i < log.data.size(); ++i) {
     const LoggedMotion& facts = log.data.facts[i];
