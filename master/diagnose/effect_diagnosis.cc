@@ -25,7 +25,6 @@ IntervalSides model_error(const EffectDiagnosis& effect, const Parameter& p, dou
 
 }  // namespace
 
-// A file a row.
 #define ROW(name) extern const EffectDiagnosis name;
 #include "master/diagnose/effects/rows.inc"
 #undef ROW

@@ -1,4 +1,4 @@
-// All that a diagnosis knows of one effect, as a row; each in a file of its own.
+// All that a diagnosis knows of one effect, as a row (effects/).
 #pragma once
 
 #include <Eigen/Core>

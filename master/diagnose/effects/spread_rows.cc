@@ -1,25 +1,108 @@
-// Starts that were read before the hand let go: only trials that follow an unrecorded move have
-// them, and only their heading, with what turns with it, is off.
+// Effects that widen the distribution of ends: single drives that slip, starts that were read too
+// early, sessions that drive at a speed of their own.
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/ranges.h"
 #include "common/effects/catalogue.h"
 #include "common/math/laws.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/session_gains.h"
+#include "master/diagnose/evidence/slip.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kTriedShares[] = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7};
-
-std::vector<double> tried_angles() {
-  std::vector<double> angles;
-  for (double a = 0.05; a < 1.6; a *= 1.25) angles.push_back(a);
-  return angles;
+SlipFit slip_of(const SpreadFit& fit) {
+  return {fit.gain, fit.estimates[0].value, fit.estimates[1].value, *fit.noise};
 }
+
+// Of a side's speed, over the trials that the fits learned from: an event's loss is uniform below
+// the greatest, and the ignored trials are taken for the worst of those with an event on either
+// side.
+double mean_loss(const Study& study, const SlipFit& slip) {
+  const double either = slip.probability * (2 - slip.probability);
+  const auto ignored = static_cast<double>(std::ranges::count(study.ignored, true));
+  const double most =
+      1 - std::min(1.0, ignored / std::max(1.0, either * static_cast<double>(study.size())));
+  return std::clamp(slip.probability * most * slip.loss * most / 2, 0.0, 0.5);
+}
+
+// Whether most outlier trials end nowhere near where a slip would have led them.
+bool are_other_outliers(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                        const SlipFit& slip, const std::vector<bool>& informative) {
+  const std::vector<SlipTrial> judged =
+      trials_with_slips(study.trials, residuals, slip, slip.probability * slip.loss / 2, 0);
+  std::size_t as_slips = 0, otherwise = 0;
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    if (!informative[i] || judged[i].squared < kFarSquared) continue;
+    ++(judged[i].nearest < kFarSquared ? as_slips : otherwise);
+  }
+  return otherwise > as_slips;
+}
+
+SpreadFit fit_slips(const Study& study, const std::vector<Eigen::Vector3d>& residuals, double) {
+  std::vector<bool> informative(study.size(), true);
+  for (std::size_t i = 0; i < study.size(); ++i) informative[i] = !study.ignores(i);
+  const SlipFit slip = fit_slip(study.trials, residuals, informative, study.noise);
+  const double p = slip.probability, loss = slip.loss;
+  SpreadFit fit{slip.gain,
+                {{"probability", p, 0.6 * p, std::min(1.0, 1.6 * p), "-"},
+                 {"loss", loss, 0.7 * loss, std::min(1.0, 1.4 * loss), "-"}}};
+  fit.noise = slip.noise;
+  if (slip.gain >= kLeastSlipGain && are_other_outliers(study, residuals, slip, informative)) {
+    fit.odd =
+        "Single drives are outliers, most of them to where no slip would have led: nothing "
+        "explains them that was looked for.";
+  }
+  return fit;
+}
+
+std::vector<double> scores_with_slips(const Study& study,
+                                      const std::vector<Eigen::Vector3d>& residuals,
+                                      const SpreadFit& fit, double outlier_share) {
+  const SlipFit slip = slip_of(fit);
+  return mapped(
+      trials_with_slips(study.trials, residuals, slip, mean_loss(study, slip), outlier_share),
+      &SlipTrial::score);
+}
+
+void write_slips(const Study& study, const SpreadFit& fit, NoiseEstimate* noise, Overrides* base) {
+  noise->drive_common = fit.noise->drive_common;
+  noise->drive_side = fit.noise->drive_side;
+  // Without events in it the fitted speed has made up for those that were not omitted.
+  if (const auto& speed = study.drive.speed) {
+    (*base)[*speed] /= 1 - mean_loss(study, slip_of(fit));
+  }
+}
+
+const SpreadRow kSlipSpread = {
+    .effect = "slip_events",
+    .least_gain = kLeastSlipGain,
+    .fit = fit_slips,
+    .scores = scores_with_slips,
+    .after_means = true,
+    .write = write_slips,
+};
+
+}  // namespace
+
+extern const EffectDiagnosis kSlipEvents = {
+    .effect = "slip_events",
+    .phrases = {"Each side slips in %1 of the trials and loses up to %2 of its speed",
+                {{"probability", 100, " %"}, {"loss", 100, " %"}},
+                "Clean the treads and the floor",
+                "Each side slips in %1 of the drives"},
+    .spread = &kSlipSpread,
+    .found = "by the tails of what is left",
+    .missing = "single drives are no outliers as slips would make them",
+};
+
+namespace {
+
+constexpr double kTriedShares[] = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7};
 
 bool follows_move(const ResidualTrial& trial) { return trial.context.moved; }
 
@@ -73,7 +156,7 @@ SpreadFit fit_unsettled(const Study& study, const std::vector<Eigen::Vector3d>& 
   const std::vector<double> straight = scores_of(study, residuals, outlier_share);
   SpreadFit best;
   double anywhere = 0;
-  for (const double angle : tried_angles()) {
+  for (double angle = 0.05; angle < 1.6; angle *= 1.25) {
     const auto ratio = turned_ratios(study, residuals, straight, angle, outlier_share);
     for (const double share : kTriedShares) {
       double after_moves = 0, others = 0;
@@ -119,6 +202,15 @@ const SpreadRow kUnsettledSpread = {
     .contaminates = follows_move,
     .detectable = detectable_shares};
 
+const SpreadRow kSessionSpread = {
+    .effect = "session_gain",
+    .least_gain = 20,  // as of a second one of a kind
+    .fit = fit_session_gains,
+    .scores = scores_with_session_gains,
+    .by_session = true,
+    .rest = beside_session_gains,
+};
+
 }  // namespace
 
 extern const EffectDiagnosis kUnsettledStart = {
@@ -130,6 +222,17 @@ extern const EffectDiagnosis kUnsettledStart = {
     .spread = &kUnsettledSpread,
     .found = "by drives that are turned after an unrecorded move",
     .missing = "drives after an unrecorded move are outliers no more than others",
+};
+
+extern const EffectDiagnosis kSessionGain = {
+    .effect = "session_gain",
+    .phrases = {"Each session drives at a speed of its own, which differ by %1",
+                {{"spread", 100, " %"}},
+                "Begin every session alike: charged, and on a clean floor",
+                "The sessions' speeds differ by %1"},
+    .spread = &kSessionSpread,
+    .found = "by sessions that drive faster or slower as a whole",
+    .missing = "no session drives faster or slower as a whole than others",
 };
 
 }  // namespace gapfarm

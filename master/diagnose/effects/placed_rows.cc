@@ -1,12 +1,26 @@
+// Effects with a place: what cameras do to positions, and patches of floor.
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/pose/pose.h"
 #include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/places/seam.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
+
+// Columns of lens_probes(): the strength, then strength times how far its centre is off.
+void start_lens(const EffectStart& at, std::map<std::string, double>* values) {
+  const Eigen::VectorXd& c = at.coefficients;
+  const Eigen::Vector2d middle = middle_of(at.study);
+  const double k1 = std::abs(c[0]) > 1e-6 ? c[0] : 1e-6;
+  (*values)["camera_distortion.k1"] = k1;
+  (*values)["camera_distortion.x"] = middle.x() + std::clamp(c[1] / k1, -1.0, 1.0);
+  (*values)["camera_distortion.y"] = middle.y() + std::clamp(c[2] / k1, -1.0, 1.0);
+}
 
 // Lines across both axes, from where few trials are on one side to where few are on the other.
 std::vector<Signature> lines(const Study& study) {
@@ -28,7 +42,7 @@ void start_seam(const EffectStart& at, std::map<std::string, double>* values) {
   const std::string& e = at.signature.effect;
   const Eigen::Vector2d middle = middle_of(at.study);
   for (std::size_t k = 0; k < at.signature.parameters.size(); ++k) {
-    (*values)[at.signature.parameters[k]] = at.coefficients[static_cast<Eigen::Index>(k)];
+    (*values)[at.signature.parameters[k]] = at.coefficients[k];
   }
   const double along = at.signature.fixed.at(e + ".axis") == 0 ? middle.y() : middle.x();
   (*values)[e + ".position"] =
@@ -87,9 +101,83 @@ EffectDiagnosis first_seam() {
 
 }  // namespace
 
+extern const EffectDiagnosis kCameraDistortion = {
+    .effect = "camera_distortion",
+    .searched = {{"k1", 0.05}, {"x", 0.1}, {"y", 0.1}},
+    .probes = [](const Study& study) { return lens_probes(middle_of(study)); },
+    .bends_view = true,
+    .start = start_lens,
+    .model_error = 0.03,
+    .places = {{"x", 0}, {"y", 1}},
+    .phrases = {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
+                {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}},
+                "Calibrate the lens",
+                "The camera's lens bends positions"},
+};
+
 extern const EffectDiagnosis kCameraSeam = first_seam();
 extern const EffectDiagnosis kCameraSeam2 = second_of_a_kind(
     first_seam(), "camera_seam_2",
     "Beyond a second seam at %a = %1 the poses are shifted by %2 in x and %3 in y, too");
+
+namespace {
+
+// At its edge a small error of the place is a large one of the motion.
+bool contaminated_at_edge(const Signature& chosen, const ResidualTrial& trial) {
+  constexpr double kEdge_m = 0.1;
+  const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
+  const Patch patch = patch_of(chosen);
+  return nearest_on_segment({patch[0], patch[1]}, from, to).distance < patch[2] + kEdge_m;
+}
+
+}  // namespace
+
+Patch patch_of(const Signature& s) {
+  const auto value = [&](const char* key) { return s.fixed.at(s.effect + "." + key); };
+  return {value("x"), value("y"), value("radius"), value("ratio")};
+}
+
+std::map<std::string, double> patch_values(const Patch& patch) {
+  return {{"friction_patch.ratio", patch[3]},
+          {"friction_patch.x", patch[0]},
+          {"friction_patch.y", patch[1]},
+          {"friction_patch.radius", patch[2]}};
+}
+
+double patch_search_error(const Parameter& p, double value, double gain) {
+  const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
+  return p.key == p.effect + ".ratio" ? kPatchRatio * weakness * (value - p.nominal)
+                                      : kPatchPlace_m * weakness;
+}
+
+namespace {
+
+// Looked for by its place: what a sketch proposes is simulated (patch.h).
+EffectDiagnosis first_patch() {
+  return {
+      .effect = kPatchEffect,
+      .searched = {{"ratio", 0.4, true}, {"x", 0.05}, {"y", 0.05}, {"radius", 0.4, true}},
+      .search_error = patch_search_error,
+      .places = {{"x", 0}, {"y", 1}},
+      .identified_by = {"x", "y", "radius"},
+      .are_two = [](const Signature& a,
+                    const Signature& b) { return are_two_patches(patch_of(a), patch_of(b)); },
+      .saturates = "ratio",
+      .contaminates = contaminated_at_edge,
+      .phrases = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times "
+                  "the friction",
+                  {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}},
+                  "Look at the floor there",
+                  "A patch of the floor has %1 times the friction"},
+  };
+}
+
+}  // namespace
+
+extern const EffectDiagnosis kFrictionPatch = first_patch();
+extern const EffectDiagnosis kFrictionPatch2 =
+    second_of_a_kind(first_patch(), "friction_patch_2",
+                     "A second patch of floor around x = %2, y = %3 of the world, of radius %4 has "
+                     "%1 times the friction");
 
 }  // namespace gapfarm
