@@ -11,7 +11,7 @@
 #include "common/math/statistics.h"
 #include "common/progress/overall_progress.h"
 #include "common/trials/trial.h"
-#include "master/diagnose/conclusions/headline.h"
+#include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/steps/steps.h"
 #include "master/diagnose/steps/watch.h"

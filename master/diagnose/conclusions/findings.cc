@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <set>
 #include <tuple>
 
-#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
@@ -18,6 +16,8 @@
 
 namespace gapfarm {
 namespace {
+
+constexpr std::size_t kFewTrialsToJudge = 60;
 
 std::string estimate_text(const Estimate& e, double factor, const std::string& unit,
                           bool intervals) {
@@ -39,11 +39,15 @@ std::string percent(double share) {
   return std::to_string(std::lround(100 * std::clamp(share, 0.0, 1.0))) + " %";
 }
 
+}  // namespace
+
 std::string counted(std::size_t count, const std::string& one, const std::string& many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-}  // namespace
+std::string times_text(double times) {
+  return times <= 1 ? "once" : "about " + plain_number(times) + " times";
+}
 
 std::string plain_number(double value) {
   if (!std::isfinite(value)) return "an unknown number";
@@ -119,7 +123,7 @@ std::string effect_claim(const NamedEffect& effect, const EffectPhrases& phrases
       filled += effect.axis.empty() ? "its axis" : effect.axis;
       continue;
     }
-    const ShownParameter& shown = phrases.parameters[static_cast<std::size_t>(*c - '1')];
+    const ShownParameter& shown = phrases.parameters[*c - '1'];
     const Estimate* e = find_by(effect.parameters, shown.key, &Estimate::key);
     if (e == nullptr) return plain_claim(effect, intervals);
     filled += estimate_text(*e, shown.factor, shown.unit, intervals);
@@ -158,79 +162,66 @@ std::vector<std::string> findings(const Diagnosis& diagnosis) {
     text.push_back("Together they close " + percent(closed) + " of the gap" +
                    change_text(diagnosis.position_mm, diagnosis.heading_mrad) + ".");
   }
-  switch (diagnosis.verdict) {
-    case Verdict::kNone:
-      text.emplace_back("The tuned model predicts the log as well as its own noise allows.");
-      break;
-    case Verdict::kUnknown:
-    case Verdict::kEffectAndUnknown:
-      if (diagnosis.verdict == Verdict::kEffectAndUnknown) {
-        text.emplace_back("Something remains that no effect of the catalogue explains.");
-      }
-      if (!diagnosis.unexplained.empty()) {
-        text.push_back(diagnosis.unexplained.front().text);
-      } else if (!diagnosis.where.empty()) {
-        text.push_back(diagnosis.where.front().text);
-      }
-      break;
-    case Verdict::kEffect:
-    case Verdict::kUnusable:
-      break;
+  if (diagnosis.verdict == Verdict::kNone) {
+    text.emplace_back("The tuned model predicts the log as well as its own noise allows.");
+  }
+  const bool remains = diagnosis.verdict == Verdict::kEffectAndUnknown;
+  if (remains) text.emplace_back("Something remains that no effect of the catalogue explains.");
+  const std::vector<Where>& left =
+      diagnosis.unexplained.empty() ? diagnosis.where : diagnosis.unexplained;
+  if ((remains || diagnosis.verdict == Verdict::kUnknown) && !left.empty()) {
+    text.push_back(left.front().text);
   }
   return text;
 }
 
 int sector_of(double angle_rad) {
+  constexpr int kSectors = 12;
   const double turn = (angle_rad + std::numbers::pi) / (2 * std::numbers::pi);
-  return static_cast<int>(std::floor(turn * kHeadingSectors)) % kHeadingSectors;
+  return static_cast<int>(std::floor(turn * kSectors)) % kSectors;
+}
+
+std::vector<std::string> stated(const std::vector<std::pair<bool, std::string>>& sentences) {
+  using Sentence = std::pair<bool, std::string>;
+  return filtered(sentences, &Sentence::first, &Sentence::second);
 }
 
 LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Cell> cells,
                        const TrialLog& log) {
+  using T = const ResidualTrial&;
   LogVariety v;
   v.trials = trials.size();
   v.paths = log.has_paths();
-  for (const Trial& trial : log.trials) v.times = v.times || trial.t_s.has_value();
-  std::set<std::size_t> sessions;
-  std::set<std::tuple<std::size_t, MotionKind, int>> commands;  // free ones may have one name
-  std::set<int> sectors;
-  std::set<long> durations, levels;
+  v.times = std::ranges::any_of(log.trials, [](const Trial& t) { return t.t_s.has_value(); });
+  v.sessions = distinct(trials, &ResidualTrial::session);
+  v.commands = distinct(trials, [&](T t) {  // free ones may have one name
+    return std::tuple(t.command, cells[t.cell].kind, cells[t.cell].mirror);
+  });
+  v.durations =
+      distinct(trials, [&](T t) { return std::lround(1000 * cells[t.cell].command.duration_s); });
+  v.levels = distinct(trials, [&](T t) { return std::lround(1000 * cells[t.cell].level); });
+  v.headings = distinct(trials, [](T t) { return sector_of(t.X_WS.theta); });
+  v.longest_min = max_of(trials, [](T t) { return t.context.session_time_s / 60; });
+  v.followers = std::ranges::count_if(trials, [](T t) { return !t.context.moved; });
   Extent box;
-  for (const ResidualTrial& t : trials) {
-    sessions.insert(t.session);
-    commands.insert({t.command, cells[t.cell].kind, cells[t.cell].mirror});
-    durations.insert(std::lround(1000 * cells[t.cell].command.duration_s));
-    levels.insert(std::lround(1000 * cells[t.cell].level));
-    sectors.insert(sector_of(t.X_WS.theta));
-    box.add(t.X_WS);
-    v.longest_min = std::max(v.longest_min, t.context.session_time_s / 60);
-    if (!t.context.moved) ++v.followers;
-  }
-  v.sessions = sessions.size();
-  v.commands = commands.size();
-  v.durations = durations.size();
-  v.levels = levels.size();
-  v.headings = sectors.size();
+  for (T t : trials) box.add(t.X_WS);
   if (!trials.empty()) v.width_m = box.longer_side();
-  std::vector<double> counts;
-  for (const Cell& cell : cells) {
-    if (cell.trials > 0) counts.push_back(double(cell.trials));
-  }
+  const std::vector<double> counts =
+      filtered(mapped(cells, [](const Cell& cell) { return double(cell.trials); }),
+               [](double count) { return count > 0; });
   if (!counts.empty()) v.typical_cell = median(counts);
   return v;
 }
 
 std::vector<std::string> lacking(const LogVariety& v) {
-  std::vector<std::string> lacks;
-  if (v.commands < 3) lacks.emplace_back("several commands");
-  if (v.durations < 2) lacks.emplace_back("several durations");
-  if (v.levels < 2) lacks.emplace_back("several levels");
-  if (v.headings < 4) lacks.emplace_back("several start headings");
-  if (v.width_m < 0.3) lacks.emplace_back("several start places");
-  if (v.followers == 0) lacks.emplace_back("trials that start where the one before ended");
-  if (!v.times) lacks.emplace_back("times");
-  if (!v.paths) lacks.emplace_back("paths");
-  return lacks;
+  return stated({{v.commands < 3, "several commands"},
+                 {v.durations < 2, "several durations"},
+                 {v.levels < 2, "several levels"},
+                 {v.headings < 4, "several start headings"},
+                 {v.width_m < 0.3, "several start places"},
+                 {v.followers == 0, "trials that start where the one before ended"},
+                 {!v.times, "times"},
+                 {!v.paths, "paths"}});
 }
 
 std::string alias_sentence(const std::string& effect, const std::vector<std::string>& aliases,
@@ -253,68 +244,47 @@ std::string few_trials_caution(std::size_t trials, const std::string& one,
 std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                                   std::span<const Cell> cells, const TrialLog& log) {
   const LogVariety v = log_variety(trials, cells, log);
-  std::vector<std::string> text;
   const std::string few = few_trials_caution(v.trials, "trial", "trials");
-  if (!few.empty()) text.push_back(few);
-  if (v.trials == 0) return text;
-  if (commands_are_free(cells)) {
-    text.emplace_back(
+  if (v.trials == 0) return {few};
+  const bool free = commands_are_free(cells);
+  return stated(
+      {{!few.empty(), few},
+       {free,
         "Hardly a command repeats: the noise is what trials vary by beyond a smooth dependence on "
-        "duties and duration, so a small dependence that is not smooth may pass for noise.");
-  } else if (v.typical_cell < kFewInCell) {
-    text.push_back("Most conditions were driven " +
-                   (v.typical_cell <= 1 ? std::string("once")
-                                        : "about " + plain_number(v.typical_cell) + " times") +
-                   ", so what repeating one varies by is hardly known, and noise may pass for an "
-                   "effect or hide one.");
-  }
-  if (v.sessions == 1) {
-    text.emplace_back(
+        "duties and duration, so a small dependence that is not smooth may pass for noise."},
+       {!free && v.typical_cell < kFewInCell,
+        "Most conditions were driven " + times_text(v.typical_cell) +
+            ", so what repeating one varies by is hardly known, and noise may pass for an effect "
+            "or hide one."},
+       {v.sessions == 1,
         "All trials are of one session: what would differ in another session cannot be seen, and "
-        "held-out trials are from the same one.");
-  }
-  if (v.commands == 1) {
-    text.push_back(
+        "held-out trials are from the same one."},
+       {v.commands == 1,
         "All trials drive one command (" + cells[trials.front().cell].command.name +
-        "): effects that differ between straight drives and turns cannot be distinguished.");
-  }
-  if (v.durations == 1) {
-    text.emplace_back(
+            "): effects that differ between straight drives and turns cannot be distinguished."},
+       {v.durations == 1,
         "Every command lasts equally long: motor_lag, timing_offset and backlash look like another "
-        "speed.");
-  }
-  if (v.levels == 1) {
-    text.emplace_back(
+        "speed."},
+       {v.levels == 1,
         "Every command runs at one level: motor_deadband and rolling_resistance look like another "
-        "speed.");
-  }
-  if (v.headings < 4) {
-    text.push_back("All trials start in " + counted(v.headings, "direction", "directions") +
-                   " (of twelve): floor_tilt, floor_nap and camera_aspect need several headings.");
-  }
-  if (v.width_m < 0.3) {
-    text.push_back("All starts lie within " + plain_number(1000 * v.width_m) +
-                   " mm: friction_patch, camera_seam and camera_distortion need several places.");
-  }
-  if (v.followers == 0) {
-    text.emplace_back(
+        "speed."},
+       {v.headings < 4,
+        "All trials start in " + counted(v.headings, "direction", "directions") +
+            " (of twelve): floor_tilt, floor_nap and camera_aspect need several headings."},
+       {v.width_m < 0.3,
+        "All starts lie within " + plain_number(1000 * v.width_m) +
+            " mm: friction_patch, camera_seam and camera_distortion need several places."},
+       {v.followers == 0,
         "No trial starts where the one before ended: backlash, a stale start pose and the noise of "
-        "one reading cannot be seen.");
-  }
-  if (!v.times) {
-    text.emplace_back(
+        "one reading cannot be seen."},
+       {!v.times,
         "The log has no times; they were guessed from the order of the trials, so the rate of "
-        "battery_sag is rough.");
-  } else if (v.longest_min < 3) {
-    text.push_back("The longest session lasts " + plain_number(v.longest_min) +
-                   " minutes: battery_sag needs longer ones.");
-  }
-  if (!v.paths) {
-    text.emplace_back(
+        "battery_sag is rough."},
+       {v.times && v.longest_min < 3, "The longest session lasts " + plain_number(v.longest_min) +
+                                          " minutes: battery_sag needs longer ones."},
+       {!v.paths,
         "Start and end poses only: what happens on the way (motor_lag, the moment at which a pose "
-        "was read) shows only by where the robot ends.");
-  }
-  return text;
+        "was read) shows only by where the robot ends."}});
 }
 
 double leftover_scale(const Regression& explained) {

@@ -1,29 +1,39 @@
 // What a diagnosis found, in plain language.
 #pragma once
 
-#include <cstddef>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "common/trials/trial.h"
+#include "common/base/ranges.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/covariates.h"
-#include "master/diagnose/evidence/residuals.h"
-#include "master/diagnose/fit/regression.h"
 #include "master/diagnose/result/diagnosis.h"
-#include "master/infer/settings.h"
 
 namespace gapfarm {
 
-// Drives go in so many directions at most, and fewer trials show little.
-inline constexpr int kHeadingSectors = 12;
+// Of twelve.
 int sector_of(double angle_rad);
-inline constexpr std::size_t kFewTrialsToJudge = 60;
+
+// How many different things `of` makes of the items.
+template <class Range, class Of>
+std::size_t distinct(const Range& range, Of of) {
+  const auto all = mapped(range, of);
+  return std::set(all.begin(), all.end()).size();
+}
+
+// The sentences that apply.
+std::vector<std::string> stated(const std::vector<std::pair<bool, std::string>>& sentences);
 
 // "3.14" to three significant digits, without trailing zeros and exponents where it can be read.
 std::string plain_number(double value);
+// "1 side", "2 sides".
+std::string counted(std::size_t count, const std::string& one, const std::string& many);
+// "once", "about 2.5 times".
+std::string times_text(double times);
 // "a", "a and b", "a, b and c".
 std::string listed(std::span<const std::string> phrases, std::string_view last = "and");
 
@@ -90,5 +100,26 @@ std::vector<Leftover> leftovers(const Regression& explained,
 // to drop when the verdict is kUnknown.  A leftover dependence below kUnknownLog10P is no
 // chance.
 Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left);
+
+// A diagnosis in one line and one action (headline.cc).
+
+// "Two cameras disagree at y = 1.34 m; something more is unexplained.": the likeliest cause in
+// plain language, about a line long; of a log with a data-quality warning, what is wrong with it.
+std::string headline(const Diagnosis& diagnosis,
+                     const EffectDiagnoses& effects = drive_effect_diagnoses());
+
+// "Trim the faster side's duty by 4.8 %, or paste the parameters below into your config.": the one
+// thing to do next.  Once next experiments are known.
+std::string action(const Diagnosis& diagnosis,
+                   const EffectDiagnoses& effects = drive_effect_diagnoses());
+
+void fill_conclusions(const EffectDiagnoses& effects, Diagnosis* diagnosis);
+
+// That an effect that gained `gain` nats beyond luck, where `least_gain` names one, is there, or
+// one of its aliases: grows with the gain, and stays below 1 by what the counts leave open.
+double confidence_of(double gain, double least_gain);
+
+// The same of what the sanity stage names.
+double sanity_confidence();
 
 }  // namespace gapfarm

@@ -1,10 +1,9 @@
-#include "master/diagnose/conclusions/headline.h"
-
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/math/laws.h"
+#include "master/diagnose/conclusions/findings.h"
 #include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
@@ -41,16 +40,12 @@ std::string cause_of(const NamedEffect& effect, const EffectDiagnoses& effects) 
 
 std::string first_cause(const Diagnosis& d, const EffectDiagnoses& effects) {
   if (d.effects.empty()) return "The readings, not the robot, are odd";
-  std::string line = cause_of(d.effects.front(), effects);
-  std::string others;
-  for (std::size_t i = 1; i < d.effects.size(); ++i) {
-    others += (i > 1 ? ", " : "; also ") + d.effects[i].name;
-  }
-  if (d.effects.size() > 1 && line.size() + others.size() > kLine) {
-    const std::size_t more = d.effects.size() - 1;
-    others = "; " + std::to_string(more) + (more == 1 ? " more cause" : " more causes");
-  }
-  return line + others;
+  const std::string line = cause_of(d.effects.front(), effects);
+  const auto more = std::span(d.effects).subspan(1);
+  if (more.empty()) return line;
+  const std::string others = "; also " + joined(more, ", ", &NamedEffect::name);
+  if (line.size() + others.size() <= kLine) return line + others;
+  return line + "; " + counted(more.size(), "more cause", "more causes");
 }
 
 // What keeps the diagnosis from naming anything; null where nothing does.

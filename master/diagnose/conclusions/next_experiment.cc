@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -34,30 +35,17 @@ void keep(const v1::PredictResult& result, Predictions& to) {
   }
 }
 
-std::vector<std::string> groups_of(const ExperimentPlan& plan) {
-  std::vector<std::string> groups;
-  for (const Design& design : plan.designs) {
-    if (contains(groups, design.group)) continue;
-    groups.push_back(design.group);
-  }
-  return groups;
-}
-
 // One task an alternative and group: enough to keep many workers busy, and what one of them cannot
 // simulate costs no other.
 Result<std::vector<Predictions>> predict(Farm& farm, const ExperimentPlan& plan,
                                          const CompetingCauses& alternatives) {
+  std::map<std::string, std::vector<std::uint32_t>> groups;
+  for (const Design& design : plan.designs) append(groups[design.group], design.trials);
   std::vector<v1::Task> tasks;
-  std::vector<std::size_t> of_baseline;
-  for (std::size_t r = 0; r < alternatives.size(); ++r) {
-    for (const std::string& group : groups_of(plan)) {
-      v1::Task task = prediction_task(alternatives[r].overrides, false);
-      for (const Design& design : plan.designs) {
-        if (design.group != group) continue;
-        for (const std::uint32_t i : design.trials) task.mutable_predict()->add_trials(i);
-      }
-      tasks.push_back(std::move(task));
-      of_baseline.push_back(r);
+  for (const CompetingCause& alternative : alternatives) {
+    for (const auto& [group, trials] : groups) {
+      tasks.push_back(prediction_task(alternative.overrides, false));
+      tasks.back().mutable_predict()->mutable_trials()->Assign(trials.begin(), trials.end());
     }
   }
   const std::string hash = farm.add_problem(to_proto(plan.problem));
@@ -71,8 +59,8 @@ Result<std::vector<Predictions>> predict(Farm& farm, const ExperimentPlan& plan,
       last = v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")";
       continue;  // that group cannot distinguish this alternative from another
     }
-    survived[of_baseline[i]] = true;
-    keep(result.predict(), all[of_baseline[i]]);
+    survived[i / groups.size()] = true;
+    keep(result.predict(), all[i / groups.size()]);
   }
   for (std::size_t r = 0; r < alternatives.size(); ++r) {
     if (survived[r]) continue;
@@ -151,9 +139,7 @@ std::vector<std::string> names_in(const std::vector<Pair>& pairs,
                                   const CompetingCauses& alternatives) {
   std::set<std::size_t> indices;
   for (const auto& [a, b] : pairs) indices.insert({a, b});
-  std::vector<std::string> names;
-  for (const std::size_t i : indices) names.push_back(alternatives[i].name);
-  return names;
+  return mapped(indices, [&](std::size_t i) { return alternatives[i].name; });
 }
 
 std::string distinguished(const std::vector<Pair>& pairs, const CompetingCauses& alternatives) {

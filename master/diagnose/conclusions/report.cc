@@ -11,7 +11,6 @@
 #include "common/math/statistics.h"
 #include "common/score/baselines.h"
 #include "master/diagnose/conclusions/findings.h"
-#include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/infer/settings.h"
@@ -42,10 +41,6 @@ void fill_where(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   const bool unexplained =
       d->verdict == Verdict::kUnknown || d->verdict == Verdict::kEffectAndUnknown;
   if (unexplained) d->unexplained = look(refit.nested.back());
-}
-
-void append(const std::vector<std::string>& more, Diagnosis* d) {
-  d->cautions.insert(d->cautions.end(), more.begin(), more.end());
 }
 
 void fill_judgement(const Judgement& judged, Diagnosis* d) {
@@ -105,17 +100,7 @@ std::string place_text(const DiagnosisRequest& of, const Signature& second,
   });
 }
 
-}  // namespace
-
-std::vector<std::string> leftover_caution(std::vector<Leftover> left) {
-  std::erase_if(left, [](const Leftover& l) { return !(l.log10_p < kUnknownLog10P); });
-  std::ranges::stable_sort(left, {}, &Leftover::log10_p);
-  std::vector<std::string> covariates = mapped(left, [](const Leftover& l) { return l.covariate; });
-  if (covariates.empty()) return {};
-  return {"What is left still depends on " + listed(covariates) +
-          (covariates.size() > 1 ? " (the clearest first)." : ".")};
-}
-
+// A simulation is worth its while when it predicts trials better than their repeats do.
 Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   if (scenario_form(of.problem.scenario).pieces) return {};
   const Explanation& named = refit.judged.named;
@@ -148,6 +133,64 @@ Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Di
   return {};
 }
 
+// An arena may have more seams, a floor more patches, than a model holds or than were clear enough:
+// a sentence each.
+Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
+                                               const Proposals& catalogue) {
+  std::vector<std::string> sentences;
+  const Regression explained = explained_by(catalogue, named);
+  for (const EffectCandidate& effect : named.chosen) {
+    const std::string& name = effect.effect();
+    const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
+    if (keys.empty() || kind_of(name) != name) continue;
+    ASSIGN_OR_RETURN(const auto second, catalogue.again(explained, name));
+    if (second.gain < of.subject.least_gain) continue;
+    Regression with_it = explained;
+    with_it.add(second.signature.columns);
+    const std::vector<Leftover> left = leftovers(with_it, named.evidence->blocks);
+    const bool all = left.empty() || left.front().log10_p >= kUnknownLog10P;
+    const bool two = named.chose(second_of(name)), room = !two && !second_of(name).empty();
+    sentences.push_back(
+        fmt::format("A {} {} ({}) would explain {} nats more of what is left{}; {}",
+                    two ? "third" : "second", name, place_text(of, second.signature, keys),
+                    std::lround(second.gain), all ? ", and nothing would remain" : "",
+                    room  ? "that is too little, or too near the first, to name it."
+                    : two ? "a model holds two."
+                          : "a model holds one."));
+  }
+  return sentences;
+}
+
+// Every named effect against its aliases, each at its best linear fit.
+Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Proposals& catalogue,
+                 Diagnosis* d) {
+  if (of.subject.experiments == nullptr) return {};
+  for (std::size_t k = 0; k < named.chosen.size(); ++k) {
+    if (named.chosen[k].aliases.empty()) continue;
+    ASSIGN_OR_RETURN(const auto alternatives, alternatives_of(of, named, k, catalogue));
+    auto next = next_experiments(of.farm, of.subject.experiments(of.problem), alternatives);
+    if (!next && next.error().code == ErrorCode::kStopped) return next.error();
+    if (!next) {
+      d->cautions.push_back("What to drive next could not be planned: " + next.error().message +
+                            ".");
+      continue;
+    }
+    append(d->next, *next);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> leftover_caution(std::vector<Leftover> left) {
+  std::ranges::stable_sort(left, {}, &Leftover::log10_p);
+  const auto covariates = filtered(
+      left, [](const Leftover& l) { return l.log10_p < kUnknownLog10P; }, &Leftover::covariate);
+  if (covariates.empty()) return {};
+  return {"What is left still depends on " + listed(covariates) +
+          (covariates.size() > 1 ? " (the clearest first)." : ".")};
+}
+
 Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& screening,
                                const Refit& refit) {
   DiagnosisResult result = begun(of);
@@ -166,18 +209,18 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
   // Cautions, the gravest first: what the simulation does not explain or model, then what the log
   // does not show, then what is only to be known.
   if (Status s = compare_with_baselines(of, refit, &d); !s) return s.error();
-  append(leftover_caution(refit.judged.left), &d);
+  append(d.cautions, leftover_caution(refit.judged.left));
   fill_values(of, refit, &result);
   fill_where(of, refit, &d);
   if (d.verdict == Verdict::kEffectAndUnknown && !named.chosen.empty()) {
     ASSIGN_OR_RETURN(const auto places, second_places(of, named, *screening.catalogue));
-    append(places, &d);
+    append(d.cautions, places);
   }
-  append(of.subject.cautions(named.study(), of.problem.log), &d);
+  append(d.cautions, of.subject.cautions(named.study(), of.problem.log));
   fill_parameters(of, refit, &result);
   ASSIGN_OR_RETURN(d.drives, shown_drives(of, result));
   d.screening = complete_screening(of, screening, refit.judged);
-  append(not_looked_for(of), &d);
+  append(d.cautions, not_looked_for(of));
   if (of.frame_m.x() != 0 || of.frame_m.y() != 0) {
     d.cautions.push_back(
         "The log lies far from the world's origin: model.toml counts places from x = " +
@@ -208,7 +251,7 @@ DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const Parti
        base ? "Give the config values at which the robot moves and comes to rest."
             : "Bring [parameters] closer to the robot; --exclude NAME goes on without an effect.",
        base ? Severity::kUnusable : Severity::kWarning});
-  append(not_simulated(of), &d);
+  append(d.cautions, not_simulated(of));
   result.tuned = of.problem.values;
   if (!base) {
     for (const auto& [row, value] : known.tuned->base) result.tuned[row] = value;
@@ -216,49 +259,6 @@ DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const Parti
   result.final_ = result.tuned;
   result.intervals.assign(of.problem.values.size(), {1, 0});
   return result;
-}
-
-Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Proposals& catalogue,
-                 Diagnosis* diagnosis) {
-  if (of.subject.experiments == nullptr) return {};
-  for (std::size_t k = 0; k < named.chosen.size(); ++k) {
-    if (named.chosen[k].aliases.empty()) continue;
-    ASSIGN_OR_RETURN(const auto alternatives, alternatives_of(of, named, k, catalogue));
-    auto next = next_experiments(of.farm, of.subject.experiments(of.problem), alternatives);
-    if (!next && next.error().code == ErrorCode::kStopped) return next.error();
-    if (!next) {
-      diagnosis->cautions.push_back(
-          "What to drive next could not be planned: " + next.error().message + ".");
-      continue;
-    }
-    diagnosis->next.insert(diagnosis->next.end(), next->begin(), next->end());
-  }
-  return {};
-}
-
-Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
-                                               const Proposals& catalogue) {
-  std::vector<std::string> sentences;
-  const Regression explained = explained_by(catalogue, named);
-  for (const EffectCandidate& effect : named.chosen) {
-    const std::string& name = effect.effect();
-    const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
-    if (keys.empty() || kind_of(name) != name) continue;
-    ASSIGN_OR_RETURN(const auto second, catalogue.again(explained, name));
-    if (second.gain < of.subject.least_gain) continue;
-    Regression with_it = explained;
-    with_it.add(second.signature.columns);
-    const std::vector<Leftover> left = leftovers(with_it, named.evidence->blocks);
-    const bool all = left.empty() || left.front().log10_p >= kUnknownLog10P;
-    const bool two = named.chose(second_of(name)), room = !two && !second_of(name).empty();
-    sentences.push_back(std::string(two ? "A third " : "A second ") + name + " (" +
-                        place_text(of, second.signature, keys) + ") would explain " +
-                        std::to_string(std::lround(second.gain)) + " nats more of what is left" +
-                        (all ? ", and nothing would remain" : "") +
-                        (room ? "; that is too little, or too near the first, to name it."
-                              : std::string("; a model holds ") + (two ? "two." : "one.")));
-  }
-  return sentences;
 }
 
 }  // namespace gapfarm::steps

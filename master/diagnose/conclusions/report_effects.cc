@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
-#include "common/base/ranges.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/diagnose/conclusions/findings.h"
-#include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/places/seam.h"
@@ -23,11 +22,9 @@ std::vector<double> gained_by(const Refit& refit, std::size_t nested) {
   return gains_over(refit.nested[nested].scores, refit.nested[nested - 1].scores);
 }
 
-// With the gap that it closes, and 90 % of how sure that is.
 void set_closed(const ClosedShare& closed, NamedEffect* effect) {
-  effect->closed = closed.share;
-  effect->closed_lo = closed.lo;
-  effect->closed_hi = closed.hi;
+  std::tie(effect->closed, effect->closed_lo, effect->closed_hi) =
+      std::tie(closed.share, closed.lo, closed.hi);
 }
 
 // The least standard deviation of a fitted row, beside the others and the nuisances, and that of
@@ -115,14 +112,6 @@ NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size
   return effect;
 }
 
-std::vector<SessionGain> named_sessions(const DiagnosisRequest& of, const Study& study,
-                                        std::vector<SessionGain> gains) {
-  for (std::size_t i = 0; i < study.size() && !gains.empty(); ++i) {
-    gains[study.trials[i].session].session = of.problem.log.trials[i].session;
-  }
-  return gains;
-}
-
 // " How much faster than on average each session drove: a 3.1 % [2.6, 3.6], b -2 % [-2.4, -1.6]."
 std::string sessions_text(const std::vector<SessionGain>& gains) {
   const auto percent = [](double share) { return plain_number(100 * share); };
@@ -141,14 +130,13 @@ NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit, const F
   effect.name = found.effect;
   effect.confidence = confidence_of(found.fit.gain, of.subject.least_gain);
   effect.parameters = found.fit.estimates;
-  effect.sessions = named_sessions(of, named.study(), found.fit.sessions);
-  effect.text = sessions_text(effect.sessions);
-  std::vector<double> gained;
-  if (contains(named.first, found.effect, &Signature::effect)) {
-    gained = gained_by(refit, 1);
-  } else {
-    gained = found.gained;
+  effect.sessions = found.fit.sessions;
+  for (std::size_t i = 0; i < named.study().size() && !effect.sessions.empty(); ++i) {
+    effect.sessions[named.study().trials[i].session].session = of.problem.log.trials[i].session;
   }
+  effect.text = sessions_text(effect.sessions);
+  std::vector<double> gained =
+      contains(named.first, found.effect, &Signature::effect) ? gained_by(refit, 1) : found.gained;
   if (gained.empty()) {
     // The gain is over all that the readings show; of the gap it can close what the means left.
     const std::size_t trials = named.study().size();
@@ -166,22 +154,18 @@ NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit, const F
 }  // namespace
 
 RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
-  double position = 0, heading = 0;
-  for (const Eigen::Vector3d& r : residuals) {
-    position += r.head<2>().squaredNorm() / static_cast<double>(residuals.size());
-    heading += r[2] * r[2] / static_cast<double>(residuals.size());
-  }
-  return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
+  const auto n = static_cast<double>(residuals.size());
+  using R = const Eigen::Vector3d&;
+  return {1e3 * std::sqrt(sum_of(residuals, [&](R r) { return r.head<2>().squaredNorm() / n; })),
+          1e3 * std::sqrt(sum_of(residuals, [&](R r) { return r[2] * r[2] / n; }))};
 }
 
 RootMeanSquare error_of_noise(const Study& study) {
-  double position = 0, heading = 0;
   const auto n = static_cast<double>(study.size());
-  for (const Eigen::Matrix3d& cov : study.covariances()) {
-    position += (cov(0, 0) + cov(1, 1)) / n;
-    heading += cov(2, 2) / n;
-  }
-  return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
+  const std::vector<Eigen::Matrix3d> all = study.covariances();
+  using C = const Eigen::Matrix3d&;
+  return {1e3 * std::sqrt(sum_of(all, [&](C cov) { return (cov(0, 0) + cov(1, 1)) / n; })),
+          1e3 * std::sqrt(sum_of(all, [&](C cov) { return cov(2, 2) / n; }))};
 }
 
 RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::size_t>& folds) {
@@ -215,8 +199,7 @@ ClosedShare closed_share(const DiagnosisRequest& of, const Refit& refit,
     }
     return gap > 0 ? std::clamp(gain / gap, -1.0, 1.5) : 0.0;
   };
-  std::vector<std::size_t> all(chains.size());
-  for (std::size_t c = 0; c < all.size(); ++c) all[c] = c;
+  std::vector<std::size_t> all = indices(chains.size());
   const double whole = share(all);
   Stream stream({of.options.seed, Purpose::kStatistics, 3, 0, 0});
   std::vector<double> shares;
@@ -236,7 +219,7 @@ std::vector<NamedEffect> named_effects(const DiagnosisRequest& of, const Refit& 
   for (const FoundSpread& found : named.spreads) {
     all.emplace_back(found.fit.gain, named_spread(of, refit, found));
   }
-  std::ranges::stable_sort(all, [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::ranges::stable_sort(all, std::greater(), &std::pair<double, NamedEffect>::first);
   std::vector<NamedEffect> effects;
   double gap = refit.floor - mean(refit.nested.front().scores);
   for (auto& [gain, effect] : all) {

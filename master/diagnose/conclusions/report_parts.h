@@ -48,16 +48,6 @@ void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisRe
 Result<std::vector<ShownDrive>> shown_drives(const DiagnosisRequest& of,
                                              const DiagnosisResult& result);
 
-// A simulation is worth its while when it predicts trials better than their repeats do.
-Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Diagnosis* diagnosis);
-// An arena may have more seams, a floor more patches, than a model holds or than were clear enough:
-// a sentence each.
-Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
-                                               const Proposals& catalogue);
-// Every named effect against its aliases, each at its best linear fit.
-Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Proposals& catalogue,
-                 Diagnosis* diagnosis);
-
 // One sentence of all that what is left depends on, the clearest first; none where there is none.
 std::vector<std::string> leftover_caution(std::vector<Leftover> left);
 // What could not be looked for, a sentence each.

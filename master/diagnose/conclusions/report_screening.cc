@@ -5,6 +5,7 @@
 #include <map>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/effects/catalogue.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
@@ -130,17 +131,17 @@ std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Scree
 }
 
 std::vector<std::string> not_looked_for(const DiagnosisRequest& of) {
+  const auto is_lacking = [&](const Effect& effect) {
+    return of.problem.external && !contains(of.table().effects(), effect.name, &Effect::name);
+  };
   std::vector<std::string> sentences;
-  std::string lacking;
-  for (const Effect& effect : of.problem.external ? srv1_effects() : std::span<const Effect>{}) {
-    const bool there = contains(of.table().effects(), effect.name, &Effect::name);
-    if (!there) lacking += (lacking.empty() ? "" : ", ") + effect.name;
-  }
+  const auto lacking = filtered(srv1_effects(), is_lacking, &Effect::name);
   if (!lacking.empty()) {
-    sentences.push_back("Not looked for, since the program does not take what they need: " +
-                        lacking + ". It may declare more inputs, or parameters of its own.");
+    sentences.push_back(
+        "Not looked for, since the program does not take what they need: " + joined(lacking) +
+        ". It may declare more inputs, or parameters of its own.");
   }
-  for (std::string& sentence : not_simulated(of)) sentences.push_back(std::move(sentence));
+  append(sentences, not_simulated(of));
   return sentences;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <set>
 
@@ -32,18 +33,15 @@ Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
 std::vector<ParameterCorrelation> correlations_of(const ParameterTable& table, const JointFit& fit,
                                                   const Eigen::MatrixXd& cov) {
   std::vector<ParameterCorrelation> all;
+  const auto key = [&](Eigen::Index k) { return table[fit.parameters[k].row].key; };
   for (Eigen::Index i = 0; i < cov.rows(); ++i) {
     for (Eigen::Index j = i + 1; j < cov.cols(); ++j) {
       const double r = cov(i, j) / std::sqrt(cov(i, i) * cov(j, j));
-      if (!std::isfinite(r)) continue;
-      const auto key = [&](Eigen::Index k) {
-        return table[fit.parameters[static_cast<std::size_t>(k)].row].key;
-      };
-      all.push_back({key(i), key(j), std::clamp(r, -1.0, 1.0)});
+      if (std::isfinite(r)) all.push_back({key(i), key(j), std::clamp(r, -1.0, 1.0)});
     }
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const auto& a, const auto& b) { return std::abs(a.r) > std::abs(b.r); });
+  std::ranges::stable_sort(all, std::greater(),
+                           [](const ParameterCorrelation& c) { return std::abs(c.r); });
   return all;
 }
 
@@ -81,9 +79,7 @@ std::vector<ShownDrive> drives_to_show(const std::vector<DiagnosedTrial>& trials
       if (fits && std::isfinite(trials[i].tuned_score)) order.push_back(i);
     }
     if (order.empty()) return;
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return trials[a].tuned_score < trials[b].tuned_score;
-    });
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return trials[i].tuned_score; });
     for (const auto& [what, i] :
          {std::pair{"worst", order.front()}, std::pair{"median", order[order.size() / 2]}}) {
       if (taken.insert(i).second) drives.push_back({i, what + (" of " + command), {}, {}, {}});
@@ -106,13 +102,15 @@ void turn(double angle_rad, DiagnosedTrial* trial) {
   }
 }
 
+std::set<std::size_t> noise_rows(const DiagnosisSubject& subject) {
+  return {subject.drive_common.row, subject.drive_side.row, subject.pose_position.row,
+          subject.pose_heading.row};
+}
+
 // The values without anything random, as differences from the problem's.
 std::vector<v1::Override> without_chance(const DiagnosisRequest& of, ParameterValues values) {
   const ParameterTable& table = of.table();
-  for (const NoiseRow& noise : {of.subject.drive_common, of.subject.drive_side,
-                                of.subject.pose_position, of.subject.pose_heading}) {
-    values[noise.row] = table[noise.row].lower;
-  }
+  for (const std::size_t row : noise_rows(of.subject)) values[row] = table[row].lower;
   table.without_chance(&values);
   return overrides_of(of.problem.values, values);
 }
@@ -120,16 +118,10 @@ std::vector<v1::Override> without_chance(const DiagnosisRequest& of, ParameterVa
 // Rows of the table that are reported: noise, base, and named effects.
 std::set<std::size_t> reported_rows(const DiagnosisRequest& of, const JointFit& fit,
                                     const std::vector<NamedEffect>& effects) {
-  std::set<std::size_t> reported;
-  for (const NoiseRow& noise : {of.subject.drive_common, of.subject.drive_side,
-                                of.subject.pose_position, of.subject.pose_heading}) {
-    reported.insert(noise.row);
-  }
+  std::set<std::size_t> reported = noise_rows(of.subject);
   for (std::size_t k = 0; k < fit.base_parameters; ++k) reported.insert(fit.parameters[k].row);
-  for (const NamedEffect& effect : effects) {
-    for (std::size_t row = 0; row < of.table().size(); ++row) {
-      if (of.table()[row].effect == effect.name) reported.insert(row);
-    }
+  for (std::size_t row = 0; row < of.table().size(); ++row) {
+    if (contains(effects, of.table()[row].effect, &NamedEffect::name)) reported.insert(row);
   }
   return reported;
 }
@@ -191,8 +183,7 @@ void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisRe
   // Of the base, which only this fit knows the spread of.
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const FittedParameter& p = fit.parameters[k];
-    const auto row = std::find_if(d.parameters.begin(), d.parameters.end(),
-                                  [&](const ParameterRow& r) { return r.key == table[p.row].key; });
+    ParameterRow* row = find_by(d.parameters, table[p.row].key, &ParameterRow::key);
     const double half = kNormal90 * p.standard_error * std::sqrt(refit.judged.scale);
     if (half > 0) {
       row->lo = std::max(row->after - half, row->lower);

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "common/base/constants.h"
 #include "common/math/statistics.h"
@@ -53,8 +54,7 @@ double value_of(const Problem& problem, const Study& study, const char* key) {
 Footprint footprint_of_turns(const Study& study) {
   constexpr double kUsualGauge_m = 0.15, kUsualCreep = 0.1, kLeastApart = 0.1;
   std::vector<double> gauges;
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    const ResidualTrial& trial = study.trials[i];
+  for (const ResidualTrial& trial : study.trials) {
     const CommandSpec& c = study.cells[trial.cell].command;
     const double turned = std::abs((trial.left + trial.right)[2]);
     const double apart = std::abs(c.right - c.left) * study.speed_m_s * c.duration_s;
@@ -280,24 +280,22 @@ std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained,
     return !wish.beside || are_two_patches(*wish.beside, patch);
   };
   for (std::size_t k = 0; k < grid_.size(); ++k) {
-    if (!is_wanted(grid_[k])) continue;
-    places.push_back({grid_[k], squares[k]});
+    if (is_wanted(grid_[k])) places.push_back({grid_[k], squares[k]});
   }
-  const auto best_first = [](const Place& a, const Place& b) { return a.squares > b.squares; };
-  std::stable_sort(places.begin(), places.end(), best_first);
+  std::ranges::stable_sort(places, std::greater(), &Place::squares);
   std::vector<Place> apart;
   const auto add = [&](const Place& place, std::vector<Place>* to) {
-    const bool known = std::any_of(to->begin(), to->end(), [&](const Place& other) {
-      return near(place.patch, other.patch, kApart_m * scale_);
-    });
-    if (!known) to->push_back(place);
+    const auto is_near = [&](const Patch& known) {
+      return near(place.patch, known, kApart_m * scale_);
+    };
+    if (std::ranges::none_of(*to, is_near, &Place::patch)) to->push_back(place);
   };
   for (const Place& place : places) {
     // A disc of the grid that is off by half a step shows a third of what the right one would.
     if (apart.size() < kClimbs && 3 * place.squares > wish.least) add(place, &apart);
   }
   for (Place& place : apart) climb(explained, &place);
-  std::stable_sort(apart.begin(), apart.end(), best_first);
+  std::ranges::stable_sort(apart, std::greater(), &Place::squares);
   std::vector<Place> found;
   for (const Place& place : apart) {
     if (found.size() == wish.most || place.squares < wish.least) break;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/effects/catalogue.h"
+#include "master/diagnose/evidence/covariates.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/infer/settings.h"
 
@@ -21,14 +22,6 @@ constexpr double kWideStep_m = 0.01;
 constexpr int kWideSteps = 8, kFineSteps = 3;
 // Of the misfit (twice nats), for a move: trials change sides one by one.
 constexpr double kWorthMoving = 2;
-
-std::vector<std::size_t> seam_rows(const ParameterTable& table, const Overrides& at) {
-  std::vector<std::size_t> rows;
-  for (const auto& [row, value] : at) {
-    if (is_seam_position(table[row].key)) rows.push_back(row);
-  }
-  return rows;
-}
 
 // The best place of one line among so many about where it is; the misfit there.
 Result<double> search_line(Predictor& predictor, const Study& study,
@@ -56,6 +49,13 @@ Result<double> search_line(Predictor& predictor, const Study& study,
   }
   fit->at[row] = place;
   return best;
+}
+
+// Readings shifted along an axis of the world, ends by `by` more than starts.
+Eigen::VectorXd shifted(const Study& study, int axis, const Feature& by) {
+  return study.whiten(mapped(study.trials, [&](const ResidualTrial& t) -> Eigen::Vector3d {
+    return rotation_about_z(-t.X_WP.theta).col(axis) * by(t);
+  }));
 }
 
 }  // namespace
@@ -90,18 +90,13 @@ Signature seam_signature(const Study& study, int axis, double position_m) {
   seam.columns.resize(static_cast<Eigen::Index>(3 * study.size()), 4);
   Eigen::Index column = 0;
   for (bool sloped : {false, true}) {
+    const auto shift = [&](const Pose& X) {
+      if ((axis == 0 ? X.x : X.y) <= position_m) return 0.0;
+      return sloped ? (axis == 0 ? X.y - middle.y() : X.x - middle.x()) : 1.0;
+    };
     for (int component = 0; component < 2; ++component) {
-      std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
-      const auto shift = [&](const Pose& X) {
-        if ((axis == 0 ? X.x : X.y) <= position_m) return 0.0;
-        return sloped ? (axis == 0 ? X.y - middle.y() : X.x - middle.x()) : 1.0;
-      };
-      for (std::size_t i = 0; i < d.size(); ++i) {
-        const ResidualTrial& t = study.trials[i];
-        const double jump = shift(t.X_WP) - shift(t.X_WS);
-        d[i] = rotation_about_z(-t.X_WP.theta).col(component) * jump;
-      }
-      seam.columns.col(column++) = study.whiten(d);
+      seam.columns.col(column++) = shifted(
+          study, component, [&](const ResidualTrial& t) { return shift(t.X_WP) - shift(t.X_WS); });
     }
   }
   seam.effect = "camera_seam";
@@ -115,15 +110,11 @@ Signature seam_signature(const Study& study, int axis, double position_m) {
 Signature linear_view_signature(const Study& study) {
   Signature view;
   view.columns.resize(static_cast<Eigen::Index>(3 * study.size()), 4);
+  using T = const ResidualTrial&;
   for (int shown = 0; shown < 2; ++shown) {
-    for (int seen = 0; seen < 2; ++seen) {
-      std::vector<Eigen::Vector3d> d;
-      for (const ResidualTrial& t : study.trials) {
-        const double moved = seen == 0 ? t.X_WP.x - t.X_WS.x : t.X_WP.y - t.X_WS.y;
-        d.push_back(rotation_about_z(-t.X_WP.theta).col(shown) * moved);
-      }
-      view.columns.col(2 * shown + seen) = study.whiten(d);
-    }
+    view.columns.col(2 * shown) = shifted(study, shown, [](T t) { return t.X_WP.x - t.X_WS.x; });
+    view.columns.col(2 * shown + 1) =
+        shifted(study, shown, [](T t) { return t.X_WP.y - t.X_WS.y; });
   }
   view.penalty = 2;
   return view;
@@ -144,8 +135,8 @@ double seam_position(const Study& study, const Regression& others, const Signatu
   const Parameter& offset = (*study.table)[study.table->row(seam.effect + ".offset_x")];
   const double shifted = std::min(std::abs(coefficients[across_x ? 0 : 1]), offset.upper);
   const double reach = shifted + 4 * kFineSeamStep_m;
-  std::vector<Pose> motions;
-  for (const ResidualTrial& t : study.trials) motions.push_back(between(t.X_WS, t.X_WP));
+  const auto motions =
+      mapped(study.trials, [](const ResidualTrial& t) { return between(t.X_WS, t.X_WP); });
   const Eigen::VectorXd left = others.left();
   double best = about, least = INFINITY;
   for (double line = about - reach; line <= about + reach; line += kFineSeamStep_m) {
@@ -177,7 +168,8 @@ Result<bool> move_seams(Predictor& predictor, const Study& study, const Eigen::M
   const Overrides before = fit->at;
   for (const auto& [step_m, steps] :
        {std::pair(kWideStep_m, kWideSteps), std::pair(kFineSeamStep_m, kFineSteps)}) {
-    for (std::size_t row : seam_rows(predictor.problem().table(), fit->at)) {
+    for (const auto& [row, value] : before) {
+      if (!is_seam_position((*study.table)[row].key)) continue;
       RETURN_IF_ERROR(search_line(predictor, study, nuisances, row, step_m, steps, fit));
     }
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -37,8 +38,8 @@ class Looker {
  public:
   Looker(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
          std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
-         const WhereOptions& options)
-      : argv_(options.labels),
+         const WhereForm& form)
+      : form_(form),
         trials_(trials),
         residuals_(residuals),
         covariances_(covariances),
@@ -51,7 +52,11 @@ class Looker {
     }
     const auto n = static_cast<double>(trials.size());
     excess_ = std::max(squares - 3 * n, std::sqrt(6 * n));
-    covariates_ = options.covariates(trials, residuals, cells);
+    covariates_ = form.covariates(trials, residuals, cells);
+    for (WhereCovariate* mean : {&mean_, &mean_of_motion_}) {
+      mean->columns.setOnes(static_cast<Eigen::Index>(trials.size()), 1);
+    }
+    mean_of_motion_.with_motion = true;
   }
 
   std::vector<Where> look(const Problem& problem) {
@@ -69,7 +74,7 @@ class Looker {
 
  private:
   std::string deviation(const Selection& s, double size, bool trend) const {
-    return argv_.deviation(s.component, size, s.along_motion, trend);
+    return form_.deviation(s.component, size, s.along_motion, trend);
   }
   double sd(std::size_t trial, int k) const { return std::sqrt(covariances_[trial](k, k)); }
   double path(std::size_t trial) const { return cells_[trials_[trial].cell].path; }
@@ -105,26 +110,23 @@ class Looker {
       std::optional<Found> best;
       for (const Selection& s : selections) {
         const View v = view(s);
-        const auto offer = [&](const WhereCovariate* covariate, TrendTest test) {
+        const auto offer = [&](const WhereCovariate& covariate, const std::vector<int>& groups) {
+          TrendTest test = trend_test(v.u, columns_of(covariate, s), v.scale, groups);
           if (test.dimensions == 0) return;
           const bool clearer = !best || test.p < best->test.p ||
                                (test.p == best->test.p && test.squares > best->test.squares);
-          if (clearer) best = Found{&s, covariate, std::move(test)};
+          if (clearer) best = Found{&s, &covariate, std::move(test)};
         };
-        const std::vector<int> none(s.trials.size(), -1);
-        offer(nullptr, trend_test(v.u, mean_column(s), v.scale, none));
+        offer(s.along_motion ? mean_of_motion_ : mean_, std::vector<int>(s.trials.size(), -1));
         for (const WhereCovariate& c : covariates_) {
-          offer(&c,
-                trend_test(v.u, columns_of(c, s), v.scale, c.within_cells ? v.groups : v.commands));
+          offer(c, c.within_cells ? v.groups : v.commands);
         }
       }
       if (!best || corrected(best->test.p) > kLevel) return;
       report(*best);
       const Selection& s = *best->selection;
       // With the part that the cells' means took: covariates are centred over all trials.
-      const Eigen::VectorXd fitted =
-          (best->covariate == nullptr ? mean_column(s) : columns_of(*best->covariate, s)) *
-          best->test.coefficients;
+      const Eigen::VectorXd fitted = columns_of(*best->covariate, s) * best->test.coefficients;
       for (std::size_t i = 0; i < s.trials.size(); ++i) {
         left_[s.trials[i]][s.component] -= s.sign[i] * fitted[i];
         spent_[s.trials[i]][s.component] += best->test.dimensions / double(s.trials.size());
@@ -138,7 +140,7 @@ class Looker {
   };
   struct Found {
     const Selection* selection = nullptr;
-    const WhereCovariate* covariate = nullptr;  // null: the mean
+    const WhereCovariate* covariate = nullptr;
     TrendTest test;
   };
 
@@ -171,9 +173,7 @@ class Looker {
   }
 
   double mean_motion(const Selection& s) const {
-    double sum = 0;
-    for (const std::size_t i : s.trials) sum += motion(s, i);
-    return sum / double(s.trials.size());
+    return sum_of(s.trials, [&](std::size_t i) { return motion(s, i); }) / double(s.trials.size());
   }
 
   Eigen::MatrixXd columns_of(const WhereCovariate& covariate, const Selection& s) const {
@@ -185,14 +185,6 @@ class Looker {
     return columns;
   }
 
-  Eigen::MatrixXd mean_column(const Selection& s) const {
-    Eigen::MatrixXd column(s.trials.size(), 1);
-    for (std::size_t i = 0; i < s.trials.size(); ++i) {
-      column(i, 0) = s.along_motion ? motion(s, s.trials[i]) : 1.0;
-    }
-    return column;
-  }
-
   void push(const Selection& s, const char* kind, const std::string& covariate, double size,
             double squares, double p, std::string text) {
     rows_.push_back({s.command, kComponents[s.component], kind, covariate, size,
@@ -200,33 +192,28 @@ class Looker {
   }
 
   void report(const Found& found) {
-    const Selection& s = *found.selection;
-    if (found.covariate != nullptr) {
-      report_trend(s, *found.covariate, found.test, view(s).scale);
+    const auto& [selection, covariate, test] = found;
+    const Selection& s = *selection;
+    const double grown = covariate->with_motion ? mean_motion(s) : 1.0;
+    const double slope = 1000 * test.coefficients[0] * covariate->unit * grown;
+    std::string text = form_.motions(s.command) + " ";
+    if (covariate->name.empty()) {
+      push(s, "bias", "", std::abs(slope), test.squares - 1, test.p,
+           text + deviation(s, slope, false) + " on average.");
       return;
     }
-    const double mean = 1000 * found.test.coefficients[0] * (s.along_motion ? mean_motion(s) : 1.0);
-    push(s, "bias", "", std::abs(mean), found.test.squares - 1, found.test.p,
-         argv_.motions(s.command) + " " + deviation(s, mean, false) + " on average.");
-  }
-
-  void report_trend(const Selection& s, const WhereCovariate& covariate, const TrendTest& test,
-                    const Eigen::VectorXd& scale) {
-    const Eigen::VectorXd fitted = test.fitted.cwiseProduct(scale);
+    const Eigen::VectorXd fitted = test.fitted.cwiseProduct(view(s).scale);
     const double size = 1000 * std::sqrt(fitted.squaredNorm() / double(fitted.size()));
-    double slope = 1000 * test.coefficients[0] * covariate.unit;
-    if (covariate.with_motion) slope *= mean_motion(s);
-    std::string text = argv_.motions(s.command) + " ";
-    if (!covariate.each.empty()) {
-      text += deviation(s, slope, true) + " " + covariate.each + ".";
+    if (!covariate->each.empty()) {
+      text += deviation(s, slope, true) + " " + covariate->each + ".";
     } else {
       text +=
-          "differ in " + argv_.component(s.component) + " by " + amount_text(size, s.component) +
+          "differ in " + form_.component(s.component) + " by " + amount_text(size, s.component) +
           " (s.d.) with the " +
-          (covariate.name == "previous residual" ? "error of the trial before" : covariate.name) +
+          (covariate->name == "previous residual" ? "error of the trial before" : covariate->name) +
           ".";
     }
-    push(s, "trend", covariate.name, size, test.squares - test.dimensions, test.p, text);
+    push(s, "trend", covariate->name, size, test.squares - test.dimensions, test.p, text);
   }
 
   // What is left about the means, apart from outliers.
@@ -291,12 +278,11 @@ class Looker {
       single.push_back(scatter_of(s));
       Scatter& one = single.back();
       judge(one);
-      pooled.count += one.count;
-      pooled.freedom += one.freedom;
-      pooled.squares += one.squares;
-      pooled.wild += one.wild;
-      pooled.variance += one.variance;
-      pooled.beyond.insert(pooled.beyond.end(), one.beyond.begin(), one.beyond.end());
+      for (double Scatter::*sum : {&Scatter::count, &Scatter::freedom, &Scatter::squares,
+                                   &Scatter::wild, &Scatter::variance}) {
+        pooled.*sum += one.*sum;
+      }
+      append(pooled.beyond, one.beyond);
     }
     judge(pooled);
     const bool several = single.size() > 1;
@@ -316,11 +302,11 @@ class Looker {
 
   void report_scatter(const Scatter& scatter, bool spread) {
     const Selection& s = scatter.selection;
-    const std::string what = argv_.component(s.component);
+    const std::string what = form_.component(s.component);
     if (!spread) {
       const std::string of = std::to_string(std::lround(scatter.count));
       push(s, "outliers", "", median(scatter.beyond), scatter.wild, scatter.p_outliers,
-           argv_.motions(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
+           form_.motions(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
                " are far off in " + what + ", where " +
                plain_number(kOutlierShare * scatter.count) + " would be by chance.");
       return;
@@ -329,20 +315,21 @@ class Looker {
     const double size =
         std::sqrt(scatter.variance / scatter.count) * std::sqrt(std::abs(ratio - 1));
     push(s, "spread", "", size, scatter.squares - scatter.freedom, scatter.p_spread,
-         argv_.motions(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
+         form_.motions(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
              " times as much in " + what + " as the noise allows (" +
              amount_text(size, s.component) + (ratio > 1 ? " beyond it)." : " below it)."));
   }
 
-  WhereLabels argv_;
+  const WhereForm& form_;
   std::span<const ResidualTrial> trials_;
   std::span<const Eigen::Vector3d> residuals_;
   std::span<const Eigen::Matrix3d> covariances_;
   std::span<const Cell> cells_;
   double excess_ = 1;
   std::vector<WhereCovariate> covariates_;
-  std::vector<Eigen::Vector3d> left_;   // residuals without what was reported
-  std::vector<Eigen::Vector3d> spent_;  // degrees of freedom that took
+  WhereCovariate mean_, mean_of_motion_;  // without a name: of nothing else
+  std::vector<Eigen::Vector3d> left_;     // residuals without what was reported
+  std::vector<Eigen::Vector3d> spent_;    // degrees of freedom that took
   std::size_t looks_ = 0;
   std::vector<Where> rows_;
 };
@@ -352,12 +339,11 @@ class Looker {
 std::vector<Where> where(std::span<const ResidualTrial> trials,
                          std::span<const Eigen::Vector3d> residuals,
                          std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
-                         const Problem& problem, const WhereOptions& options) {
+                         const Problem& problem, const WhereForm& form) {
   assert(trials.size() == residuals.size() && trials.size() == covariances.size());
   if (trials.empty()) return {};
-  std::vector<Where> rows = Looker(trials, residuals, covariances, cells, options).look(problem);
-  std::stable_sort(rows.begin(), rows.end(),
-                   [](const Where& a, const Where& b) { return a.share > b.share; });
+  std::vector<Where> rows = Looker(trials, residuals, covariances, cells, form).look(problem);
+  std::ranges::stable_sort(rows, std::greater(), &Where::share);
   if (rows.size() > kMostRows) rows.resize(kMostRows);
   return rows;
 }

@@ -3,28 +3,42 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/problem/problem.h"
 #include "master/diagnose/conclusions/findings.h"
-#include "master/diagnose/evidence/residuals.h"
-#include "master/diagnose/places/where_covariates.h"
+#include "master/diagnose/evidence/covariates.h"
 #include "master/diagnose/result/diagnosis.h"
 
 namespace gapfarm {
 
-struct WhereLabels {
+// What the residuals may depend on.
+struct WhereCovariate {
+  std::string name;
+  Eigen::MatrixXd columns = {};  // of all trials
+  bool with_motion = false;      // multiplied by the path
+  bool within_cells = true;
+  double unit = 1;        // of the sentence, in units of the column
+  std::string each = {};  // "with every minute of the session"; empty: no slope to show
+};
+// Takes the columns, centred, from every trial's features.
+void add_covariate(WhereCovariate covariate, std::span<const ResidualTrial> trials,
+                   const std::vector<Feature>& features, std::vector<WhereCovariate>* all);
+// Which of several sessions a trial is of.
+std::vector<Feature> session_features(std::span<const ResidualTrial> trials);
+// Everything that a log of drives shows of each trial.
+std::vector<WhereCovariate> where_covariates(std::span<const ResidualTrial> trials,
+                                             std::span<const Eigen::Vector3d> residuals,
+                                             std::span<const Cell> cells);
+
+// A scenario's words and covariates.
+struct WhereForm {
   std::string (*motions)(const std::string& command) = motions_of;
   std::string (*component)(int component) = component_text;
   std::string (*deviation)(int component, double size, bool along_motion,
                            bool trend) = deviation_text;
-};
-
-struct WhereOptions {
-  WhereLabels labels = {};
-  std::vector<WhereCovariate> (*covariates)(std::span<const ResidualTrial> trials,
-                                            std::span<const Eigen::Vector3d> residuals,
-                                            std::span<const Cell> cells) = where_covariates;
+  decltype(&where_covariates) covariates = where_covariates;
 };
 
 // The dependences of `residuals` (measured minus predicted end, m, m, rad, in the predicted end's
@@ -58,6 +72,27 @@ struct WhereOptions {
 std::vector<Where> where(std::span<const ResidualTrial> trials,
                          std::span<const Eigen::Vector3d> residuals,
                          std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
-                         const Problem& problem, const WhereOptions& options = {});
+                         const Problem& problem, const WhereForm& form = {});
+
+// What columns explain of values with unit variance, beyond the mean of each group.
+struct TrendTest {
+  double squares = 0;  // explained sum of squares
+  int dimensions = 0;  // independent columns; 0: nothing to test, p = 1
+  // F-test against what the fit leaves, so noise that is larger than was thought alarms nobody.
+  double p = 1;
+  Eigen::VectorXd fitted;        // of each value
+  Eigen::VectorXd coefficients;  // of each column; 0 for one that depends on those before it
+};
+
+// Weighted least squares: `scale[i]` is the s.d. that value i was divided by, so a group's mean and
+// the columns (in the units before the division) are divided by it too.  `groups[i]` numbers the
+// group of value i; a negative number everywhere: no means are taken out.
+// REQUIRES: as many rows, scales and groups as values; scales > 0.
+TrendTest trend_test(const Eigen::VectorXd& values, const Eigen::MatrixXd& columns,
+                     const Eigen::VectorXd& scale, std::span<const int> groups);
+
+// Weighted mean of each value's group, one a value, scaled like the values.  Same arguments.
+Eigen::VectorXd group_means(const Eigen::VectorXd& values, const Eigen::VectorXd& scale,
+                            std::span<const int> groups);
 
 }  // namespace gapfarm

@@ -1,5 +1,3 @@
-#include "master/diagnose/places/where_covariates.h"
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -9,93 +7,77 @@
 #include "common/math/algebra.h"
 #include "common/math/laws.h"
 #include "common/pose/pose.h"
+#include "master/diagnose/places/where.h"
 
 namespace gapfarm {
-namespace {
 
-std::vector<double> middle(std::span<const ResidualTrial> trials) {
-  Extent box;
-  for (const ResidualTrial& t : trials) box.add(t.X_WS);
-  return {(box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2};
-}
-
-}  // namespace
-
-void add_covariate(WhereCovariate covariate, std::size_t trials,
-                   const std::function<std::vector<double>(std::size_t)>& values,
-                   std::vector<WhereCovariate>* all) {
-  covariate.columns.resize(trials, static_cast<Eigen::Index>(values(0).size()));
-  for (std::size_t i = 0; i < trials; ++i) {
-    const std::vector<double> row = values(i);
-    covariate.columns.row(i) =
-        Eigen::Map<const Eigen::RowVectorXd>(row.data(), covariate.columns.cols());
+void add_covariate(WhereCovariate covariate, std::span<const ResidualTrial> trials,
+                   const std::vector<Feature>& features, std::vector<WhereCovariate>* all) {
+  covariate.columns.resize(trials.size(), features.size());
+  for (std::size_t k = 0; k < features.size(); ++k) {
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      covariate.columns(i, k) = features[k](trials[i]);
+    }
   }
   covariate.columns.rowwise() -= covariate.columns.colwise().mean().eval();
   all->push_back(std::move(covariate));
 }
 
+std::vector<Feature> session_features(std::span<const ResidualTrial> trials) {
+  const auto last = static_cast<std::size_t>(max_of(trials, &ResidualTrial::session));
+  std::vector<Feature> features;
+  for (std::size_t s = 1; s <= last; ++s) {
+    features.push_back([s](const ResidualTrial& t) { return t.session == s ? 1.0 : 0.0; });
+  }
+  return features;
+}
+
 std::vector<WhereCovariate> where_covariates(std::span<const ResidualTrial> trials,
                                              std::span<const Eigen::Vector3d> residuals,
                                              std::span<const Cell> cells) {
+  using T = const ResidualTrial&;
   std::vector<WhereCovariate> all;
-  const auto add = [&](WhereCovariate covariate,
-                       const std::function<std::vector<double>(std::size_t)>& values) {
-    add_covariate(std::move(covariate), trials.size(), values, &all);
+  const auto add = [&](WhereCovariate covariate, const std::vector<Feature>& features) {
+    add_covariate(std::move(covariate), trials, features, &all);
   };
-  using V = std::vector<double>;
-  const auto& t = trials;
-  const auto cell = [&](std::size_t i) -> const Cell& { return cells[t[i].cell]; };
   add({"time", {}, true, true, 60, "with every minute of the session"},
-      [&](std::size_t i) { return V{t[i].context.session_time_s}; });
+      {[](T t) { return t.context.session_time_s; }});
   add({"duration", {}, false, false, 1, "with every second that the command lasts"},
-      [&](std::size_t i) { return V{cell(i).command.duration_s}; });
+      {[&](T t) { return cells[t.cell].command.duration_s; }});
   add({"level", {}, false, false, 0.1, "with every tenth of the level"},
-      [&](std::size_t i) { return V{cell(i).level}; });
+      {[&](T t) { return cells[t.cell].level; }});
   add({"place in run", {}, true, true, 1, "with every trial since the robot was put down"},
-      [&](std::size_t i) { return V{double(t[i].context.place_in_run)}; });
-  add({"direction change", {}}, [&](std::size_t i) {
-    return V{t[i].context.last_left * cell(i).command.left < 0 ? 1.0 : 0.0,
-             t[i].context.last_right * cell(i).command.right < 0 ? 1.0 : 0.0};
-  });
-  const char* const heading[] = {"start heading", "start heading, 2nd harmonic",
-                                 "start heading, 4th harmonic"};
-  for (int h = 0; h < 3; ++h) {
-    const int order = 1 << h;
-    add({heading[h], {}, true}, [&t, order](std::size_t i) {
-      return V{std::cos(order * t[i].X_WS.theta), std::sin(order * t[i].X_WS.theta)};
-    });
+      {[](T t) { return double(t.context.place_in_run); }});
+  add({"direction change"},
+      {[&](T t) { return t.context.last_left * cells[t.cell].command.left < 0 ? 1.0 : 0.0; },
+       [&](T t) { return t.context.last_right * cells[t.cell].command.right < 0 ? 1.0 : 0.0; }});
+  for (const auto& [order, name] : {std::pair(1, "start heading"),
+                                    {2, "start heading, 2nd harmonic"},
+                                    {4, "start heading, 4th harmonic"}}) {
+    add({name, {}, true}, harmonics([order](T t) { return order * t.X_WS.theta; }, 1));
   }
-  const V centre = middle(trials);
+  Extent box;
+  for (T t : trials) box.add(t.X_WS);
+  const double x = (box.x0 + box.x1) / 2, y = (box.y0 + box.y1) / 2;
   add({"start x", {}, true, true, 0.1, "with every 100 mm that they start farther along x"},
-      [&](std::size_t i) { return V{t[i].X_WS.x - centre[0]}; });
+      {[=](T t) { return t.X_WS.x - x; }});
   add({"start y", {}, true, true, 0.1, "with every 100 mm that they start farther along y"},
-      [&](std::size_t i) { return V{t[i].X_WS.y - centre[1]}; });
-  add({"radius from the middle",
-       {},
-       true,
-       true,
-       0.1,
-       "with every 100 mm that they start farther from the arena's middle"},
-      [&](std::size_t i) {
-        return V{std::hypot(t[i].X_WS.x - centre[0], t[i].X_WS.y - centre[1])};
-      });
-  std::size_t sessions = 0;
-  for (const ResidualTrial& trial : t) sessions = std::max(sessions, trial.session + 1);
-  if (sessions > 1) {
-    add({"session", {}, true}, [&](std::size_t i) {
-      V one(sessions - 1, 0.0);
-      if (t[i].session > 0) one[t[i].session - 1] = 1;
-      return one;
+      {[=](T t) { return t.X_WS.y - y; }});
+  const std::string away = "with every 100 mm that they start farther from the arena's middle";
+  add({"radius from the middle", {}, true, true, 0.1, away},
+      {[=](T t) { return std::hypot(t.X_WS.x - x, t.X_WS.y - y); }});
+  if (const auto sessions = session_features(trials); !sessions.empty()) {
+    add({"session", {}, true}, sessions);
+  }
+  std::vector<Feature> before;
+  for (int k = 0; k < 3; ++k) {
+    before.push_back([=](T t) {
+      return t.context.previous && !t.context.moved ? residuals[*t.context.previous][k] : 0;
     });
   }
-  add({"previous residual", {}}, [&](std::size_t i) {
-    const auto& before = t[i].context.previous;
-    if (!before || t[i].context.moved) return V{0, 0, 0};
-    const Eigen::Vector3d& r = residuals[*before];
-    return V{r[0], r[1], r[2]};
-  });
+  add({"previous residual"}, before);
   add({"unrecorded move", {}, true, true, 1, "when the robot was put down by hand just before"},
-      [&](std::size_t i) { return V{t[i].context.moved ? 1.0 : 0.0}; });
+      {[](T t) { return t.context.moved ? 1.0 : 0.0; }});
   return all;
 }
 
@@ -104,13 +86,13 @@ Eigen::VectorXd group_means(const Eigen::VectorXd& values, const Eigen::VectorXd
   const int last = groups.empty() ? -1 : *std::max_element(groups.begin(), groups.end());
   std::vector<std::pair<double, double>> sums(last + 1);
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    auto& [value, weight] = sums[static_cast<std::size_t>(groups[i])];
+    auto& [value, weight] = sums[groups[i]];
     value += values[i] / scale[i];
     weight += 1 / (scale[i] * scale[i]);
   }
   Eigen::VectorXd means(values.size());
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const auto& [value, weight] = sums[static_cast<std::size_t>(groups[i])];
+    const auto& [value, weight] = sums[groups[i]];
     means[i] = value / weight / scale[i];
   }
   return means;

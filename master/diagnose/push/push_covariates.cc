@@ -19,33 +19,30 @@ double arm(const ResidualTrial& t) {
   return std::clamp(t.push.arm_m / t.push.gyration_m, -kFarArm, kFarArm);
 }
 
-// By component: along, across, turn.
-Eigen::Vector3d grown(const ResidualTrial& t) {
-  return {t.spread.slid_m, t.spread.slid_m, t.spread.slid_m / t.push.gyration_m};
+// A length by component: along, across, turn.
+Eigen::Vector3d by_component(const ResidualTrial& t, double length_m) {
+  return {length_m, length_m, length_m / t.push.gyration_m};
 }
 
 Eigen::VectorXd column(const Study& study, int component, const Feature& feature) {
-  std::vector<Eigen::Vector3d> d;
-  for (const ResidualTrial& t : study.trials) {
+  return study.whiten(mapped(study.trials, [&](const ResidualTrial& t) {
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();
     shift[component] = t.push.touched ? feature(t) : 0;
-    d.push_back(from_push_axes(t, shift));
-  }
-  return study.whiten(d);
+    return from_push_axes(t, shift);
+  }));
 }
 
-// The same of what another physics gets wrong.
-Eigen::Vector3d misfit(const ResidualTrial& t) {
-  return {t.push.pushed_m, t.push.pushed_m, t.push.pushed_m / t.push.gyration_m};
-}
+// What another physics gets wrong grows with.
+Eigen::Vector3d misfit(const ResidualTrial& t) { return by_component(t, t.push.pushed_m); }
 
 CovariateBlock block(const Study& study, const std::string& name,
                      const std::vector<Feature>& features) {
   std::vector<Eigen::VectorXd> columns;
   for (const Feature& feature : features) {
     for (int k = 0; k < 3; ++k) {
-      columns.push_back(
-          column(study, k, [&](const ResidualTrial& t) { return feature(t) * grown(t)[k]; }));
+      columns.push_back(column(study, k, [&](const ResidualTrial& t) {
+        return feature(t) * by_component(t, t.spread.slid_m)[k];
+      }));
     }
   }
   return {name, stack(columns)};
@@ -57,12 +54,11 @@ CovariateBlock readings(const Study& study) {
   std::vector<Eigen::VectorXd> columns;
   for (const auto& power : powers_of_place(study)) {
     for (int k = 0; k < 2; ++k) {
-      std::vector<Eigen::Vector3d> d;
-      for (const ResidualTrial& t : study.trials) {
-        d.push_back(power(t.X_WP) * rotation_about_z(-t.X_WP.theta).col(k) -
-                    power(t.X_WS) * t.spread.start.col(k));
-      }
-      columns.push_back(study.whiten(d));
+      columns.push_back(
+          study.whiten(mapped(study.trials, [&](const ResidualTrial& t) -> Eigen::Vector3d {
+            return power(t.X_WP) * rotation_about_z(-t.X_WP.theta).col(k) -
+                   power(t.X_WS) * t.spread.start.col(k);
+          })));
     }
   }
   return {"place of the readings", stack(columns)};
@@ -78,18 +74,17 @@ std::vector<Feature> powers(const Feature& value, int most) {
 
 // `value` less its mean, over its standard deviation; 0 where it hardly varies.
 Feature standardised(const Study& study, const Feature& value, double least_sd) {
+  using T = const ResidualTrial&;
   const auto n = static_cast<double>(study.size());
-  double mean = 0, square = 0;
-  for (const ResidualTrial& t : study.trials) mean += value(t) / n;
-  for (const ResidualTrial& t : study.trials) square += std::pow(value(t) - mean, 2) / n;
-  const double sd = std::sqrt(square);
+  const double mean = sum_of(study.trials, [&](T t) { return value(t) / n; });
+  const double sd =
+      std::sqrt(sum_of(study.trials, [&](T t) { return std::pow(value(t) - mean, 2) / n; }));
   if (sd < least_sd) return [](const ResidualTrial&) { return 0.0; };
   return [=](const ResidualTrial& t) { return std::clamp((value(t) - mean) / sd, -3.0, 3.0); };
 }
 
 std::vector<Feature> in_each_piece(const Study& study, const std::vector<Feature>& features) {
-  std::size_t most = 0;
-  for (const ResidualTrial& t : study.trials) most = std::max(most, t.command);
+  const auto most = static_cast<std::size_t>(max_of(study.trials, &ResidualTrial::command));
   std::vector<Feature> all;
   for (std::size_t c = 0; c <= most; ++c) {
     for (const Feature& f : features) {
@@ -161,22 +156,22 @@ std::vector<CovariateBlock> push_blocks(const Study& study) {
   const auto order = standardised(
       study, [](const ResidualTrial& t) { return t.context.session_time_s; }, 1);
 
-  std::vector<CovariateBlock> blocks;
-  blocks.push_back(block(study, "piece", in_each_piece(study, {one})));
-  blocks.push_back(block(study, "contact offset", powers(arm, 3)));
-  blocks.push_back(block(study, "place of the touch on its edge",
-                         powers([](const ResidualTrial& t) { return t.push.along_edge; }, 3)));
-  blocks.push_back(block(study, "side of the piece", in_each_piece(study, harmonics(in_piece, 2))));
-  blocks.push_back(block(study, "push direction", harmonics(direction, 1)));
-  blocks.push_back(block(study, "push direction, twice a turn",
-                         harmonics([=](const ResidualTrial& t) { return 2 * direction(t); }, 1)));
-  blocks.push_back(block(study, "start heading",
-                         harmonics([](const ResidualTrial& t) { return t.X_WS.theta; }, 2)));
-  blocks.push_back(block(study, "start place", start_place(study)));
-  blocks.push_back(readings(study));
-  blocks.push_back(block(study, "distance slid", powers(slid, 2)));
-  blocks.push_back(block(study, "finger speed", powers(speed, 2)));
-  blocks.push_back(block(study, "order of the pushes", powers(order, 2)));
+  std::vector<CovariateBlock> blocks = {
+      block(study, "piece", in_each_piece(study, {one})),
+      block(study, "contact offset", powers(arm, 3)),
+      block(study, "place of the touch on its edge",
+            powers([](const ResidualTrial& t) { return t.push.along_edge; }, 3)),
+      block(study, "side of the piece", in_each_piece(study, harmonics(in_piece, 2))),
+      block(study, "push direction", harmonics(direction, 1)),
+      block(study, "push direction, twice a turn",
+            harmonics([=](const ResidualTrial& t) { return 2 * direction(t); }, 1)),
+      block(study, "start heading",
+            harmonics([](const ResidualTrial& t) { return t.X_WS.theta; }, 2)),
+      block(study, "start place", start_place(study)),
+      readings(study),
+      block(study, "distance slid", powers(slid, 2)),
+      block(study, "finger speed", powers(speed, 2)),
+      block(study, "order of the pushes", powers(order, 2))};
   if (study.sessions > 1 && study.sessions <= 8) blocks.push_back(sessions_block(study));
   return blocks;
 }

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "common/base/ranges.h"
@@ -126,23 +128,19 @@ std::vector<Patch> patch_grid(const Study& study, double radius_m) {
     std::sort(places.begin(), places.end());
     places.erase(std::unique(places.begin(), places.end()), places.end());
     if (places.size() > kMostPatches) continue;
-    std::vector<Patch> patches;
-    for (const auto& [x, y] : places) {
-      patches.push_back({static_cast<double>(x) * spacing, static_cast<double>(y) * spacing,
-                         std::max(radius_m, spacing / kPatchSpacing), 1});
-    }
-    return patches;
+    return mapped(places, [&](const auto& place) {
+      return Patch{static_cast<double>(place.first) * spacing,
+                   static_cast<double>(place.second) * spacing,
+                   std::max(radius_m, spacing / kPatchSpacing), 1};
+    });
   }
 }
 
 }  // namespace
 
 const EffectDiagnoses& push_effect_diagnoses() {
-  static const std::vector<EffectDiagnosis> rows = [] {
-    std::vector<EffectDiagnosis> both = push_rows();
-    for (const EffectDiagnosis& row : camera_rows()) both.push_back(row);
-    return both;
-  }();
+  static const std::vector<EffectDiagnosis> rows =
+      flattened(std::array{push_rows(), camera_rows()}, std::identity());
   static const EffectDiagnoses all(mapped(rows, [](const EffectDiagnosis& row) { return &row; }));
   return all;
 }
@@ -160,10 +158,8 @@ std::vector<infer::Start> push_patch_starts(const Study& study) {
   std::vector<infer::Start> starts;
   for (Patch place : patch_grid(study, kRadius_m)) {
     infer::Start start;
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      if (piece_crosses(study.trials[i], place)) {
-        start.reach.push_back(static_cast<std::uint32_t>(i));
-      }
+    for (std::uint32_t i = 0; i < study.size(); ++i) {
+      if (piece_crosses(study.trials[i], place)) start.reach.push_back(i);
     }
     if (start.reach.empty()) continue;
     for (const double ratio : kRatios) {

@@ -2,11 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <set>
 
-#include "common/base/ranges.h"
 #include "common/parameters/table.h"
-#include "common/score/fitness.h"
 #include "master/diagnose/places/where.h"
 #include "master/diagnose/push/push_subject.h"
 #include "master/infer/settings.h"
@@ -39,47 +36,37 @@ std::string push_deviation(int component, double size, bool along_motion, bool t
 std::vector<WhereCovariate> covariates(std::span<const ResidualTrial> trials,
                                        std::span<const Eigen::Vector3d> /*residuals*/,
                                        std::span<const Cell> /*cells*/) {
-  std::vector<WhereCovariate> all;
-  const auto add = [&](const std::string& name, double unit, const std::string& each,
-                       const std::vector<std::function<double(const ResidualTrial&)>>& of) {
-    const auto values = [&](std::size_t i) {
-      return mapped(of, [&](const auto& f) { return trials[i].push.touched ? f(trials[i]) : 0; });
-    };
-    add_covariate({name, {}, false, false, unit, each}, trials.size(), values, &all);
-  };
   using T = const ResidualTrial&;
-  add("contact offset", 0.01, "with every 10 mm that the centroid lies farther left of the push",
-      {[](T t) { return t.push.arm_m; }});
-  add("place of the touch", 0.1, "with every tenth of the half edge that the touch lies farther on",
-      {[](T t) { return t.push.along_edge; }});
-  for (int h : {1, 2}) {
+  std::vector<WhereCovariate> all;
+  const auto add = [&](const std::string& name, const std::vector<Feature>& features,
+                       double unit = 1, const std::string& each = "") {
+    const auto of_touched = [](const Feature& f) -> Feature {
+      return [=](T t) { return t.push.touched ? f(t) : 0; };
+    };
+    add_covariate({name, {}, false, false, unit, each}, trials, mapped(features, of_touched), &all);
+  };
+  add("contact offset", {[](T t) { return t.push.arm_m; }}, 0.01,
+      "with every 10 mm that the centroid lies farther left of the push");
+  add("place of the touch", {[](T t) { return t.push.along_edge; }}, 0.1,
+      "with every tenth of the half edge that the touch lies farther on");
+  for (const int h : {1, 2}) {
     const std::string times = h == 1 ? "" : ", twice a turn";
-    add("push direction" + times, 1, "",
-        {[h](T t) { return std::cos(h * t.push.direction_rad); },
-         [h](T t) { return std::sin(h * t.push.direction_rad); }});
-    add("side of the piece" + times, 1, "",
-        {[h](T t) { return std::cos(h * t.push.in_piece_rad); },
-         [h](T t) { return std::sin(h * t.push.in_piece_rad); }});
+    add("push direction" + times, harmonics([h](T t) { return h * t.push.direction_rad; }, 1));
+    add("side of the piece" + times, harmonics([h](T t) { return h * t.push.in_piece_rad; }, 1));
   }
-  add("start heading", 1, "",
-      {[](T t) { return std::cos(t.X_WS.theta); }, [](T t) { return std::sin(t.X_WS.theta); }});
-  add("distance pushed", 0.01, "with every 10 mm of the finger's way",
-      {[](T t) { return t.push.pushed_m; }});
-  add("finger speed", 0.01, "with every 10 mm/s of the finger",
-      {[](T t) { return t.push.speed_m_s; }});
-  add("start x", 0.1, "with every 100 mm that they start farther along x",
-      {[](T t) { return t.X_WS.x; }});
-  add("start y", 0.1, "with every 100 mm that they start farther along y",
-      {[](T t) { return t.X_WS.y; }});
-  add("order", 1 / 60.0, "with every second of the session",
-      {[](T t) { return t.context.session_time_s / 60; }});
-  std::size_t sessions = 0;
-  for (T t : trials) sessions = std::max(sessions, t.session + 1);
-  std::vector<std::function<double(T)>> indicators;
-  for (std::size_t s = 1; s < sessions; ++s) {
-    indicators.emplace_back([s](T t) { return t.session == s ? 1.0 : 0.0; });
-  }
-  if (!indicators.empty()) add("session", 1, "", indicators);
+  add("start heading", harmonics([](T t) { return t.X_WS.theta; }, 1));
+  add("distance pushed", {[](T t) { return t.push.pushed_m; }}, 0.01,
+      "with every 10 mm of the finger's way");
+  add("finger speed", {[](T t) { return t.push.speed_m_s; }}, 0.01,
+      "with every 10 mm/s of the finger");
+  add("start x", {[](T t) { return t.X_WS.x; }}, 0.1,
+      "with every 100 mm that they start farther along x");
+  add("start y", {[](T t) { return t.X_WS.y; }}, 0.1,
+      "with every 100 mm that they start farther along y");
+  add("order", {[](T t) { return t.context.session_time_s / 60; }}, 1 / 60.0,
+      "with every second of the session");
+  const std::vector<Feature> sessions = session_features(trials);
+  if (!sessions.empty()) add("session", sessions);
   return all;
 }
 
@@ -91,19 +78,15 @@ struct PushVariety : LogVariety {
 
 PushVariety variety(const Study& study, const TrialLog& log) {
   PushVariety v{log_variety(study.trials, study.cells, log)};
-  std::set<int> directions, sides;
-  for (const ResidualTrial& t : study.trials) {
-    if (!t.push.touched) {
-      ++v.missed;
-      continue;
-    }
-    directions.insert(sector_of(t.push.direction_rad));
-    sides.insert(sector_of(t.push.in_piece_rad));
-    v.fastest = std::max(v.fastest, t.push.speed_m_s);
-    v.slowest = std::min(v.slowest, t.push.speed_m_s);
+  const std::vector<PushGeometry> pushes =
+      filtered(mapped(study.trials, &ResidualTrial::push), &PushGeometry::touched);
+  v.missed = study.size() - pushes.size();
+  v.directions = distinct(pushes, [](const PushGeometry& p) { return sector_of(p.direction_rad); });
+  v.sides = distinct(pushes, [](const PushGeometry& p) { return sector_of(p.in_piece_rad); });
+  for (const PushGeometry& push : pushes) {
+    v.fastest = std::max(v.fastest, push.speed_m_s);
+    v.slowest = std::min(v.slowest, push.speed_m_s);
   }
-  v.directions = directions.size();
-  v.sides = sides.size();
   return v;
 }
 
@@ -121,68 +104,47 @@ std::vector<Where> push_where(const Study& study, std::span<const Eigen::Vector3
     along_push.push_back(rotation_about_z(turn_rad) * residuals[i]);
     covariances[i] = rotate_covariance(covariances[i], turn_rad);
   }
-  WhereOptions options;
-  options.labels = {pushes_of, push_component, push_deviation};
-  options.covariates = covariates;
-  return where(study.trials, along_push, covariances, study.cells, problem, options);
+  return where(study.trials, along_push, covariances, study.cells, problem,
+               {pushes_of, push_component, push_deviation, covariates});
 }
 
 std::vector<std::string> push_cautions(const Study& study, const TrialLog& log) {
   const PushVariety v = variety(study, log);
-  std::vector<std::string> text;
-  const auto add_caution = [&](const std::string& sentence) { text.push_back(sentence); };
   const std::string few = few_trials_caution(study.size(), "push", "pushes");
-  if (!few.empty()) add_caution(few);
-  if (v.missed > 0) {
-    add_caution(std::to_string(v.missed) + " of " + std::to_string(study.size()) +
-                " pushes do not touch their piece where the log has it; they say little.");
-  }
-  if (v.typical_cell < kFewestAlike) {
-    add_caution("Most pushes were done " +
-                (v.typical_cell <= 1 ? std::string("once")
-                                     : "about " + plain_number(v.typical_cell) + " times") +
-                ", so what repeating one varies by is taken from what nothing smooth explains.");
-  }
-  if (v.directions < 4) {
-    add_caution("The finger went in " + std::to_string(v.directions) +
-                (v.directions == 1 ? " direction" : " directions") +
-                " (of twelve): friction_anisotropy, table_tilt and camera_aspect need several.");
-  }
-  if (v.sides < 4) {
-    add_caution("Pieces were pushed at " + std::to_string(v.sides) +
-                (v.sides == 1 ? " side" : " sides") +
-                " (of twelve): com_offset, pressure_distribution and marker_offset need several.");
-  }
-  if (v.width_m < 0.3) {
-    add_caution("All starts lie within " + plain_number(1000 * v.width_m) +
-                " mm: friction_patch and camera_distortion need several places.");
-  }
-  if (one_speed(v)) {
-    add_caution(
+  return stated(
+      {{!few.empty(), few},
+       {v.missed > 0,
+        std::to_string(v.missed) + " of " + std::to_string(study.size()) +
+            " pushes do not touch their piece where the log has it; they say little."},
+       {v.typical_cell < kFewestAlike,
+        "Most pushes were done " + times_text(v.typical_cell) +
+            ", so what repeating one varies by is taken from what nothing smooth explains."},
+       {v.directions < 4,
+        "The finger went in " + counted(v.directions, "direction", "directions") +
+            " (of twelve): friction_anisotropy, table_tilt and camera_aspect need several."},
+       {v.sides < 4,
+        "Pieces were pushed at " + counted(v.sides, "side", "sides") +
+            " (of twelve): com_offset, pressure_distribution and marker_offset need several."},
+       {v.width_m < 0.3, "All starts lie within " + plain_number(1000 * v.width_m) +
+                             " mm: friction_patch and camera_distortion need several places."},
+       {one_speed(v),
         "The finger always went equally fast: friction_speed hardly shows, and finger_compliance "
-        "looks like a smaller finger.");
-  }
-  if (one_speed(v) && study.base.count(row_of(Push::kGroundFriction)) > 0) {
-    add_caution(
+        "looks like a smaller finger."},
+       {one_speed(v) && study.base.count(row_of(Push::kGroundFriction)) > 0,
         "Pushes of one speed hardly show ground_friction, and an angle of table_tilt is known only "
-        "in proportion to it: measure it, and give it in [parameters], not in [genes].");
-  }
-  if (study.sessions > 1 && study.sessions <= 8) {
-    add_caution("Effects are taken to be alike in all " + std::to_string(study.sessions) +
-                " sessions; what changed between them shows as a dependence on the session.");
-  }
-  return text;
+        "in proportion to it: measure it, and give it in [parameters], not in [genes]."},
+       {study.sessions > 1 && study.sessions <= 8,
+        "Effects are taken to be alike in all " + std::to_string(study.sessions) +
+            " sessions; what changed between them shows as a dependence on the session."}});
 }
 
 std::vector<std::string> push_lacks(const Study& study, const TrialLog& log) {
   const PushVariety v = variety(study, log);
-  std::vector<std::string> lacks;
-  if (v.commands < 2) lacks.emplace_back("several pieces");
-  if (v.directions < 4) lacks.emplace_back("pushes in several directions");
-  if (v.sides < 4) lacks.emplace_back("pushes at several sides");
-  if (one_speed(v)) lacks.emplace_back("several speeds");
-  if (v.width_m < 0.3) lacks.emplace_back("several start places");
-  return lacks;
+  return stated({{v.commands < 2, "several pieces"},
+                 {v.directions < 4, "pushes in several directions"},
+                 {v.sides < 4, "pushes at several sides"},
+                 {one_speed(v), "several speeds"},
+                 {v.width_m < 0.3, "several start places"}});
 }
 
 TrialView push_view(const Study& study, std::size_t trial) {

@@ -4,7 +4,6 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "master/diagnose/conclusions/findings.h"
-#include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/diagnose.h"
 #include "master/diagnose/fit/estimate.h"

@@ -11,9 +11,7 @@
 #include "common/effects/catalogue.h"
 #include "common/random/stream.h"
 #include "master/diagnose/conclusions/findings.h"
-#include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/evidence/session_gains.h"
-#include "master/diagnose/places/where_covariates.h"
 
 namespace gapfarm::where_test {
 namespace {
