@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <span>
 
 #include "common/base/ranges.h"
@@ -17,6 +16,11 @@ namespace {
 
 constexpr double kAlmostSure = 0.99;  // no log makes surer than this
 
+void add_alias(const std::string& name, NamedEffect* effect) {
+  if (name == effect->name || effect->aliases.size() >= kMostAliases) return;
+  if (!contains(effect->aliases, name)) effect->aliases.push_back(name);
+}
+
 class GroundReport {
  public:
   GroundReport(const GroundRobot& robot, const GroundSearch& search,
@@ -27,27 +31,332 @@ class GroundReport {
         fitter_(robot, search.windows, search.reference, options.memo),
         intervals_(fitter_.intervals(search.fit, options.seed)) {}
 
-  Diagnosis write();
-  std::vector<ReportedValue> reported_values() const;
-  const GroundFigures& figures_of() const { return figures_; }
+  GroundDiagnosis write() {
+    faults();
+    readings();
+    figures_.faults += report_sensor(search_.sensor, &d_);
+    values();
+    const std::size_t values_named = d_.effects.size();
+    if (search_.loop) report_wheel_loop(*search_.loop, search_.reference.has_value(), &d_);
+    figures_.faults += static_cast<int>(d_.effects.size() - values_named);
+    figures();
+    judge();
+    result_.values = reported_values();
+    if (const std::string sure = further_values(search_, result_.values); !sure.empty()) {
+      d_.cautions.push_back(sure);
+    }
+    clocks();
+    screening();
+    trials();
+    name_headline();
+    d_.action = what_to_do(search_, figures_, d_);
+    return std::move(result_);
+  }
 
  private:
-  void clocks();
-  void readings();
-  void faults();
-  void values();
-  void figures();
-  void share_with_faults();
-  void screening();
-  void trials();
+  // Of components of the residuals, in thousandths.
+  double rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Index count) const {
+    double sum = 0;
+    const auto raw = fitter_.raw_residuals(fit);
+    const WindowSet& windows = search_.windows;
+    for (std::size_t i = 0; i < raw.size(); ++i) {
+      if (windows.sense_of(i) == Sense::kPose) sum += raw[i].segment(first, count).squaredNorm();
+    }
+    return 1e3 * std::sqrt(sum / (windows.stretches() * windows.lengths));
+  }
+
+  NamedEffect effect_of(const GroundStep& step, std::size_t place) {
+    const GroundHypothesis& h = search_.catalogue[step.chosen];
+    NamedEffect effect;
+    effect.name = h.name;
+    for (const std::size_t other : step.not_distinguished) {
+      add_alias(search_.catalogue[other].name, &effect);
+    }
+    for (const std::string& alias : h.aliases) add_alias(alias, &effect);
+    // What is named beside it is no alternative to it.
+    std::erase_if(effect.aliases, [&](const std::string& alias) {
+      return contains(search_.steps, alias, [&](const GroundStep& named) {
+        return search_.catalogue[named.chosen].name;
+      });
+    });
+    if (!effect.aliases.empty()) {
+      effect.alias_reason = "They move this robot alike on these runs.";
+    }
+    for (const KinematicRow& row : h.freed) {
+      if (const Eigen::Index j = row_index(search_.fit.rows, row.name); j >= 0) {
+        effect.parameters.push_back(
+            estimate_of(row, search_.fit.values[j], intervals_(j, 0), intervals_(j, 1)));
+      }
+    }
+    const double floor = mean(search_.best.nats);
+    const WindowFit &before = step.before, &after = search_.chain[place + 1];
+    effect.gap_before = floor - mean(before.nats);
+    effect.gap_after = floor - mean(after.nats);
+    effect.position_mm_before = rms_mm(before);
+    effect.position_mm_after = rms_mm(after);
+    effect.heading_mrad_before = rms_mrad(before);
+    effect.heading_mrad_after = rms_mrad(after);
+    const HeldOutGain closed =
+        share_of_gap(search_.windows, after, before, search_.best, search_.chain[0], options_.seed);
+    effect.closed = closed.mean;
+    effect.closed_lo = closed.lo;
+    effect.closed_hi = closed.hi;
+    // What was gained over what would just have been worth a name.
+    effect.confidence =
+        std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
+    const bool unknown = search_.reference && search_.reference->leaves_open(h.freed);
+    effect.text = text_of_values(robot_, h, effect, search_.reference && !unknown);
+    if (h.describe) h.describe(fitter_, search_.fit, options_.seed, &effect);
+    if (unknown) effect.text += " The reference does not show it, so it may have been so before.";
+    return effect;
+  }
+
+  void faults() {
+    for (const FoundFault& fault : search_.faults) {
+      const GroundHypothesis& h = search_.catalogue[fault.hypothesis];
+      const double gap = fault.gain / search_.windows.stretches();
+      NamedEffect effect = sure_effect(
+          h.name, h.aliases,
+          fmt::format(
+              "The log is wrong in {}: put right, what {} expects is {:.1f} times as near to "
+              "what was measured.",
+              h.thing, source_of(robot_), std::exp(gap / 3)),
+          h.remedy);
+      effect.gap_before = gap;
+      effect.text += " " + h.remedy;
+      d_.effects.push_back(std::move(effect));
+    }
+  }
+
   // What is beyond doubt, a warning of the log's too.
   NamedEffect sure_effect(const std::string& name, const std::vector<std::string>& aliases,
-                          std::string text, const std::string& remedy);
-  NamedEffect effect_of(const GroundStep& step, std::size_t place);
-  void name_headline();
-  void judge();
-  // Of components of the residuals, in thousandths.
-  double rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Index count) const;
+                          std::string text, const std::string& remedy) {
+    NamedEffect effect;
+    effect.name = name;
+    for (const std::string& alias : aliases) add_alias(alias, &effect);
+    effect.confidence = kAlmostSure;
+    effect.text = std::move(text);
+    d_.sanity.push_back({name, effect.text, remedy, Severity::kNote, true, effect.aliases});
+    return effect;
+  }
+
+  // What the poses show by themselves.
+  void readings() {
+    append(d_.sanity, search_.jumps.findings);
+    const auto add = [&](const char* name, const std::vector<std::string>& aliases,
+                         Estimate estimate, std::string text, const char* remedy) {
+      NamedEffect effect = sure_effect(name, aliases, std::move(text), remedy);
+      effect.parameters = {std::move(estimate)};
+      // What was read is no answer to what changed.
+      if (search_.reference) return;
+      d_.effects.push_back(std::move(effect));
+      ++figures_.faults;
+    };
+    if (const StaleFrames& s = search_.stale; s.lo >= kLeastStaleShare) {
+      add("stale_frames", {"pose_latency"}, {"share", s.share, s.lo, s.hi, "-"},
+          fmt::format(
+              "{} of {} poses on the way, {:.1f} % [{:.1f}, {:.1f}], repeat the one before; "
+              "they were held out.",
+              s.repeats, s.frames, 100 * s.share, 100 * s.lo, 100 * s.hi),
+          "Log a pose once, with the time at which it was measured.");
+    }
+    const PoseGrid& g = search_.grid;
+    const double rounding_m = g.step_m / std::sqrt(6.0);  // of the difference of two positions
+    const double least_m = search_.free_fit.scales.front().head<2>().minCoeff();
+    if (g.step_m > 0 && rounding_m >= kLeastRounding * least_m) {
+      add("pose_quantisation", {}, {"step", g.step_m, g.lo_m, g.hi_m, "m"},
+          fmt::format("Positions are rounded to a grid of {:.4g} mm ({:.0f} nats).", 1e3 * g.step_m,
+                      g.nats),
+          "Log more digits.");
+    }
+  }
+
+  void values() {
+    for (std::size_t k = 0; k < search_.steps.size(); ++k) {
+      d_.effects.push_back(effect_of(search_.steps[k], k));
+      figures_.named.push_back(search_.steps[k].held_out);
+    }
+  }
+
+  void figures() {
+    const double floor = mean(search_.best.nats);
+    const WindowFit &file = search_.chain.front(), &named = search_.chain.back();
+    d_.gap = {floor - mean(file.nats), floor - mean(named.nats), 0};
+    share_with_faults();
+    d_.position_mm = {rms_mm(file), rms_mm(named), rms_mm(search_.best)};
+    d_.heading_mrad = {rms_mrad(file), rms_mrad(named), rms_mrad(search_.best)};
+    append(d_.cautions, cautions_of(robot_, search_));
+  }
+
+  // The gap is the log's as it was: what putting it right closes is a part, what values close is a
+  // share of the rest.
+  void share_with_faults() {
+    const double rest = std::max(0.0, d_.gap.tuned);
+    const std::span<NamedEffect> of_faults(d_.effects.data(), search_.faults.size());
+    const double faults = sum_of(of_faults, &NamedEffect::gap_before);
+    if (of_faults.empty() || !(faults + rest > 0)) return;
+    for (NamedEffect& effect : d_.effects) {
+      for (double* share : {&effect.closed, &effect.closed_lo, &effect.closed_hi}) {
+        *share *= rest / (faults + rest);
+      }
+    }
+    for (NamedEffect& fault : of_faults) {
+      fault.closed = fault.closed_lo = fault.closed_hi = fault.gap_before / (faults + rest);
+    }
+    d_.gap.tuned += faults;
+  }
+
+  void judge() {
+    figures_.faults += static_cast<int>(search_.faults.size());
+    figures_.closable = search_.closable;
+    figures_.best_of_all = search_.best_of_all;
+    figures_.far_runs = far_runs(fitter_, search_);
+    figures_.unexplained = search_.unexplained;
+    figures_.stood = hardly_moved(search_.log);
+    d_.verdict = ground_verdict(figures_);
+    d_.findings.push_back(verdict_reason(figures_));
+    if (!search_.stand_ins.empty()) d_.findings.push_back(nearest_of_catalogue(search_));
+    unseen_ = values_not_shown(fitter_, search_, options_.seed);
+    if (!unseen_.empty()) d_.cautions.push_back(unseen_);
+    const std::string moved = values_that_would_move(search_);
+    if (nothing_is_left(figures_)) {
+      if (search_.reference && d_.gap.final_ > kToleratedGap) {
+        d_.findings.insert(d_.findings.begin(),
+                           "What gap there is closes where values move as they do from log to log" +
+                               (moved.empty() ? "." : ": " + moved + "."));
+      }
+      return;
+    }
+    d_.where = where_left(fitter_, search_);
+    if (!moved.empty()) {
+      d_.findings.push_back("Were all values free, these would move most: " + moved + ".");
+    }
+  }
+
+  void clocks() {
+    // A run that is off by itself looks as if its clock were.
+    const std::string runs = figures_.far_runs.empty() ? clocks_apart(fitter_, search_) : "";
+    if (runs.empty()) return;
+    d_.cautions.push_back(
+        "The runs' clocks are apart: from command to pose it takes " + runs +
+        ". Each log's commands and poses need one clock; how late they are on the "
+        "whole is no surer than that.");
+  }
+
+  void screening() {
+    if (search_.offers.empty()) return;
+    for (const Offer& offer : search_.offers.front()) {
+      const GroundHypothesis& h = search_.catalogue[offer.hypothesis];
+      Screened s;
+      s.effect = h.name;
+      s.gain = offer.gain;
+      s.p = std::exp(-std::max(0.0, offer.gain));
+      const bool fitted = offer.values.size() > 0;
+      for (std::size_t k = 0; fitted && k < h.freed.size(); ++k) {
+        s.estimate += fmt::format("{}{} {:+.4g} {}", k > 0 ? ", " : "", h.freed[k].key,
+                                  offer.values[k] - h.freed[k].nominal, h.freed[k].unit);
+      }
+      s.note = h.thing;
+      d_.screening.push_back(std::move(s));
+    }
+    for (const auto& offers : search_.offers) {
+      SelectionRecord record;
+      for (std::size_t k = 0; k < d_.steps.size(); ++k) {
+        record.explained.push_back(search_.catalogue[search_.steps[k].chosen].name);
+      }
+      for (std::size_t k = 0; k < std::min<std::size_t>(offers.size(), 5); ++k) {
+        record.offered.emplace_back(search_.catalogue[offers[k].hypothesis].name, offers[k].gain);
+      }
+      d_.steps.push_back(std::move(record));
+    }
+  }
+
+  void trials() {
+    const auto cov_of = [&](const WindowFit& fit, std::size_t i) {
+      const Eigen::Vector3d s = fit.scales[search_.windows.horizon[i]];
+      return Eigen::Matrix3d(s.cwiseProduct(s).asDiagonal());
+    };
+    d_.shown = {{"left_speed", "speed of the left side, m/s", "left side"},
+                {"right_speed", "speed of the right side, m/s", "right side"},
+                {"ahead", "speed ahead, m/s", "speed ahead"},
+                {"turn", "rate of turning, rad/s", "rate of turning"}};
+    const std::vector<WindowSpeeds> speeds = window_speeds(fitter_, search_.chain.back());
+    const auto tuned = fitter_.raw_residuals(search_.chain.front());
+    const auto last = fitter_.raw_residuals(search_.chain.back());
+    for (std::size_t i = 0; i < search_.windows.trials.size(); ++i) {
+      if (search_.windows.sense_of(i) != Sense::kPose) continue;
+      const Trial& from = search_.windows.trials[i];
+      DiagnosedTrial t;
+      t.session = from.session;
+      t.trial = static_cast<std::int64_t>(i);
+      t.command = search_.windows.length_text(search_.windows.horizon[i]);
+      t.session_time_s = *from.t_s;
+      t.duration_s = *from.duration_s;
+      t.held_out = true;
+      t.X_WS = from.X_WS;
+      t.measured = between(from.X_WS, from.X_WE);
+      t.tuned_residual = tuned[i];
+      t.final_residual = last[i];
+      t.tuned = between(from.X_WS, expected_end(from, t.tuned_residual));
+      t.final_ = between(from.X_WS, expected_end(from, t.final_residual));
+      t.tuned_cov = cov_of(search_.chain.front(), i);
+      t.final_cov = cov_of(search_.chain.back(), i);
+      t.tuned_score = search_.chain.front().nats[i];
+      t.final_score = search_.chain.back().nats[i];
+      const WindowSpeeds& v = speeds[i];
+      t.covariates = {v.left_m_s, v.right_m_s, v.ahead_m_s, v.turn_rad_s};
+      d_.trials.push_back(std::move(t));
+    }
+  }
+
+  void name_headline() {
+    const bool changes = search_.reference.has_value();
+    if (d_.effects.empty()) {
+      const bool nothing = d_.verdict == Verdict::kNone;
+      d_.headline =
+          changes   ? (nothing ? "Nothing changed by more than a robot does from log to log."
+                               : "Something changed that nothing of the catalogue explains alone.")
+          : nothing ? nothing_wrong(robot_)
+          : something_is_left(figures_)
+              ? "Something is wrong that nothing of the catalogue explains alone."
+              : "Nothing is significantly wrong, but these runs do not exclude it.";
+      if (!d_.findings.empty()) d_.headline += " " + d_.findings.front();
+      if (!unseen_.empty()) d_.headline += " " + unseen_;
+      return;
+    }
+    d_.headline = d_.effects.front().text;
+    if (changes && d_.effects.size() == 1 && !d_.headline.empty()) {
+      d_.headline.back() = ';';
+      d_.headline +=
+          d_.verdict == Verdict::kEffect ? " nothing else." : " it does not explain all.";
+    }
+    if (d_.effects.size() > 1) {
+      d_.headline +=
+          " Beside it: " + joined(std::span(d_.effects).subspan(1), ", ", &NamedEffect::name) + ".";
+    }
+  }
+
+  std::vector<ReportedValue> reported_values() const {
+    std::vector<ReportedValue> values;
+    for (std::size_t j = 0; j < search_.fit.rows.size(); ++j) {
+      const FitRow& row = search_.fit.rows[j];
+      const double had = row.row.nominal, off = search_.fit.values[j] - had;
+      const Interval interval = {intervals_(j, 0), intervals_(j, 1)};
+      // What fits move without its name predicts as well, but costs as many nats as a name.
+      const bool known = search_.unexplained < kUnexplained &&
+                         std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
+                         (interval.lower > had || interval.upper < had);
+      // Against a reference every value is the two logs' own.
+      values.push_back({row.row.name, value_in_file(robot_, row.row.name), search_.fit.values[j],
+                        interval, row.free || known || search_.reference.has_value()});
+      for (const SensorValue& v : search_.sensor) {
+        if (v.row.name != row.row.name) continue;
+        values.back() = {v.row.name, v.had, v.value, v.interval, v.shown};
+      }
+    }
+    return values;
+  }
+
   double rms_mm(const WindowFit& fit) const { return rms_of(fit, 0, 2); }
   double rms_mrad(const WindowFit& fit) const { return rms_of(fit, 2, 1); }
 
@@ -57,344 +366,16 @@ class GroundReport {
   WindowFitter fitter_;
   Eigen::MatrixX2d intervals_;
   std::string unseen_;  // which values no window shows; empty: none
-  GroundFigures figures_;
-  Diagnosis d_;
+  GroundDiagnosis result_;
+  Diagnosis& d_ = result_.diagnosis;
+  GroundFigures& figures_ = result_.figures;
 };
-
-double GroundReport::rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Index count) const {
-  double sum = 0;
-  const auto raw = fitter_.raw_residuals(fit);
-  const WindowSet& windows = search_.windows;
-  for (std::size_t i = 0; i < raw.size(); ++i) {
-    if (windows.sense_of(i) == Sense::kPose) sum += raw[i].segment(first, count).squaredNorm();
-  }
-  return 1e3 * std::sqrt(sum / (windows.stretches() * windows.lengths));
-}
-
-void add_alias(const std::string& name, NamedEffect* effect) {
-  if (name == effect->name || effect->aliases.size() >= kMostAliases) return;
-  if (!contains(effect->aliases, name)) effect->aliases.push_back(name);
-}
-
-NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
-  const GroundHypothesis& h = search_.catalogue[step.chosen];
-  NamedEffect effect;
-  effect.name = h.name;
-  for (const std::size_t other : step.not_distinguished) {
-    add_alias(search_.catalogue[other].name, &effect);
-  }
-  for (const std::string& alias : h.aliases) add_alias(alias, &effect);
-  // What is named beside it is no alternative to it.
-  std::erase_if(effect.aliases, [&](const std::string& alias) {
-    return std::ranges::any_of(search_.steps, [&](const GroundStep& named) {
-      return search_.catalogue[named.chosen].name == alias;
-    });
-  });
-  if (!effect.aliases.empty()) {
-    effect.alias_reason = "They move this robot alike on these runs.";
-  }
-  for (const KinematicRow& row : h.freed) {
-    if (const Eigen::Index j = row_index(search_.fit.rows, row.name); j >= 0) {
-      effect.parameters.push_back(
-          estimate_of(row, search_.fit.values[j], intervals_(j, 0), intervals_(j, 1)));
-    }
-  }
-  const double floor = mean(search_.best.nats);
-  const WindowFit &before = step.before, &after = search_.chain[place + 1];
-  effect.gap_before = floor - mean(before.nats);
-  effect.gap_after = floor - mean(after.nats);
-  effect.position_mm_before = rms_mm(before);
-  effect.position_mm_after = rms_mm(after);
-  effect.heading_mrad_before = rms_mrad(before);
-  effect.heading_mrad_after = rms_mrad(after);
-  const HeldOutGain closed =
-      share_of_gap(search_.windows, after, before, search_.best, search_.chain[0], options_.seed);
-  effect.closed = closed.mean;
-  effect.closed_lo = closed.lo;
-  effect.closed_hi = closed.hi;
-  // What was gained over what would just have been worth a name.
-  effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
-  const bool unknown = search_.reference && search_.reference->leaves_open(h.freed);
-  effect.text = text_of_values(robot_, h, effect, search_.reference && !unknown);
-  if (h.describe) h.describe(fitter_, search_.fit, options_.seed, &effect);
-  if (unknown) effect.text += " The reference does not show it, so it may have been so before.";
-  return effect;
-}
-
-void GroundReport::faults() {
-  for (const FoundFault& fault : search_.faults) {
-    const GroundHypothesis& h = search_.catalogue[fault.hypothesis];
-    const double gap = fault.gain / search_.windows.stretches();
-    NamedEffect effect = sure_effect(
-        h.name, h.aliases,
-        fmt::format("The log is wrong in {}: put right, what {} expects is {:.1f} times as near to "
-                    "what was measured.",
-                    h.thing, source_of(robot_), std::exp(gap / 3)),
-        h.remedy);
-    effect.gap_before = gap;
-    effect.text += " " + h.remedy;
-    d_.effects.push_back(std::move(effect));
-  }
-}
-
-NamedEffect GroundReport::sure_effect(const std::string& name,
-                                      const std::vector<std::string>& aliases, std::string text,
-                                      const std::string& remedy) {
-  NamedEffect effect;
-  effect.name = name;
-  for (const std::string& alias : aliases) add_alias(alias, &effect);
-  effect.confidence = kAlmostSure;
-  effect.text = std::move(text);
-  d_.sanity.push_back({name, effect.text, remedy, Severity::kNote, true, effect.aliases});
-  return effect;
-}
-
-// What the poses show by themselves.
-void GroundReport::readings() {
-  d_.sanity.insert(d_.sanity.end(), search_.jumps.findings.begin(), search_.jumps.findings.end());
-  const auto add = [&](const char* name, const std::vector<std::string>& aliases, Estimate estimate,
-                       std::string text, const char* remedy) {
-    NamedEffect effect = sure_effect(name, aliases, std::move(text), remedy);
-    effect.parameters = {std::move(estimate)};
-    // What was read is no answer to what changed.
-    if (search_.reference) return;
-    d_.effects.push_back(std::move(effect));
-    ++figures_.faults;
-  };
-  if (const StaleFrames& s = search_.stale; s.lo >= kLeastStaleShare) {
-    add("stale_frames", {"pose_latency"}, {"share", s.share, s.lo, s.hi, "-"},
-        fmt::format("{} of {} poses on the way, {:.1f} % [{:.1f}, {:.1f}], repeat the one before; "
-                    "they were held out.",
-                    s.repeats, s.frames, 100 * s.share, 100 * s.lo, 100 * s.hi),
-        "Log a pose once, with the time at which it was measured.");
-  }
-  const PoseGrid& g = search_.grid;
-  const double rounding_m = g.step_m / std::sqrt(6.0);  // of the difference of two positions
-  const double least_m = search_.free_fit.scales.front().head<2>().minCoeff();
-  if (g.step_m > 0 && rounding_m >= kLeastRounding * least_m) {
-    add("pose_quantisation", {}, {"step", g.step_m, g.lo_m, g.hi_m, "m"},
-        fmt::format("Positions are rounded to a grid of {:.4g} mm ({:.0f} nats).", 1e3 * g.step_m,
-                    g.nats),
-        "Log more digits.");
-  }
-}
-
-void GroundReport::values() {
-  for (std::size_t k = 0; k < search_.steps.size(); ++k) {
-    d_.effects.push_back(effect_of(search_.steps[k], k));
-    figures_.named.push_back(search_.steps[k].held_out);
-  }
-}
-
-void GroundReport::figures() {
-  const double floor = mean(search_.best.nats);
-  const WindowFit &file = search_.chain.front(), &named = search_.chain.back();
-  d_.gap = {floor - mean(file.nats), floor - mean(named.nats), 0};
-  share_with_faults();
-  d_.position_mm = {rms_mm(file), rms_mm(named), rms_mm(search_.best)};
-  d_.heading_mrad = {rms_mrad(file), rms_mrad(named), rms_mrad(search_.best)};
-  std::ranges::copy(cautions_of(robot_, search_), std::back_inserter(d_.cautions));
-}
-
-// The gap is the log's as it was: what putting it right closes is a part, what values close is a
-// share of the rest.
-void GroundReport::share_with_faults() {
-  const double rest = std::max(0.0, d_.gap.tuned);
-  double faults = 0;
-  const std::span<NamedEffect> of_faults(d_.effects.data(), search_.faults.size());
-  for (const NamedEffect& fault : of_faults) faults += fault.gap_before;
-  if (of_faults.empty() || !(faults + rest > 0)) return;
-  for (NamedEffect& effect : d_.effects) {
-    for (double* share : {&effect.closed, &effect.closed_lo, &effect.closed_hi}) {
-      *share *= rest / (faults + rest);
-    }
-  }
-  for (NamedEffect& fault : of_faults) {
-    fault.closed = fault.closed_lo = fault.closed_hi = fault.gap_before / (faults + rest);
-  }
-  d_.gap.tuned += faults;
-}
-
-void GroundReport::judge() {
-  figures_.faults += static_cast<int>(search_.faults.size());
-  figures_.closable = search_.closable;
-  figures_.best_of_all = search_.best_of_all;
-  figures_.far_runs = far_runs(fitter_, search_);
-  figures_.unexplained = search_.unexplained;
-  figures_.stood = hardly_moved(search_.log);
-  d_.verdict = ground_verdict(figures_);
-  d_.findings.push_back(verdict_reason(figures_));
-  if (!search_.stand_ins.empty()) d_.findings.push_back(nearest_of_catalogue(search_));
-  unseen_ = values_not_shown(fitter_, search_, options_.seed);
-  if (!unseen_.empty()) d_.cautions.push_back(unseen_);
-  const std::string moved = values_that_would_move(search_);
-  if (nothing_is_left(figures_)) {
-    if (search_.reference && d_.gap.final_ > kToleratedGap) {
-      d_.findings.insert(d_.findings.begin(),
-                         "What gap there is closes where values move as they do from log to log" +
-                             (moved.empty() ? "." : ": " + moved + "."));
-    }
-    return;
-  }
-  d_.where = where_left(fitter_, search_);
-  if (!moved.empty()) {
-    d_.findings.push_back("Were all values free, these would move most: " + moved + ".");
-  }
-}
-
-void GroundReport::clocks() {
-  // A run that is off by itself looks as if its clock were.
-  const std::string runs = figures_.far_runs.empty() ? clocks_apart(fitter_, search_) : "";
-  if (runs.empty()) return;
-  d_.cautions.push_back("The runs' clocks are apart: from command to pose it takes " + runs +
-                        ". Each log's commands and poses need one clock; how late they are on the "
-                        "whole is no surer than that.");
-}
-
-void GroundReport::screening() {
-  if (search_.offers.empty()) return;
-  for (const Offer& offer : search_.offers.front()) {
-    const GroundHypothesis& h = search_.catalogue[offer.hypothesis];
-    Screened s;
-    s.effect = h.name;
-    s.gain = offer.gain;
-    s.p = std::exp(-std::max(0.0, offer.gain));
-    const bool fitted = offer.values.size() > 0;
-    for (std::size_t k = 0; fitted && k < h.freed.size(); ++k) {
-      s.estimate += fmt::format("{}{} {:+.4g} {}", k > 0 ? ", " : "", h.freed[k].key,
-                                offer.values[k] - h.freed[k].nominal, h.freed[k].unit);
-    }
-    s.note = h.thing;
-    d_.screening.push_back(std::move(s));
-  }
-  for (const auto& offers : search_.offers) {
-    SelectionRecord record;
-    for (std::size_t k = 0; k < d_.steps.size(); ++k) {
-      record.explained.push_back(search_.catalogue[search_.steps[k].chosen].name);
-    }
-    for (std::size_t k = 0; k < std::min<std::size_t>(offers.size(), 5); ++k) {
-      record.offered.emplace_back(search_.catalogue[offers[k].hypothesis].name, offers[k].gain);
-    }
-    d_.steps.push_back(std::move(record));
-  }
-}
-
-void GroundReport::trials() {
-  const auto cov_of = [&](const WindowFit& fit, std::size_t i) {
-    const Eigen::Vector3d s = fit.scales[search_.windows.horizon[i]];
-    return Eigen::Matrix3d(s.cwiseProduct(s).asDiagonal());
-  };
-  d_.shown = {{"left_speed", "speed of the left side, m/s", "left side"},
-              {"right_speed", "speed of the right side, m/s", "right side"},
-              {"ahead", "speed ahead, m/s", "speed ahead"},
-              {"turn", "rate of turning, rad/s", "rate of turning"}};
-  const std::vector<WindowSpeeds> speeds = window_speeds(fitter_, search_.chain.back());
-  const auto tuned = fitter_.raw_residuals(search_.chain.front());
-  const auto last = fitter_.raw_residuals(search_.chain.back());
-  for (std::size_t i = 0; i < search_.windows.trials.size(); ++i) {
-    if (search_.windows.sense_of(i) != Sense::kPose) continue;
-    const Trial& from = search_.windows.trials[i];
-    DiagnosedTrial t;
-    t.session = from.session;
-    t.trial = static_cast<std::int64_t>(i);
-    t.command = search_.windows.length_text(search_.windows.horizon[i]);
-    t.session_time_s = *from.t_s;
-    t.duration_s = *from.duration_s;
-    t.held_out = true;
-    t.X_WS = from.X_WS;
-    t.measured = between(from.X_WS, from.X_WE);
-    t.tuned_residual = tuned[i];
-    t.final_residual = last[i];
-    t.tuned = between(from.X_WS, expected_end(from, t.tuned_residual));
-    t.final_ = between(from.X_WS, expected_end(from, t.final_residual));
-    t.tuned_cov = cov_of(search_.chain.front(), i);
-    t.final_cov = cov_of(search_.chain.back(), i);
-    t.tuned_score = search_.chain.front().nats[i];
-    t.final_score = search_.chain.back().nats[i];
-    const WindowSpeeds& v = speeds[i];
-    t.covariates = {v.left_m_s, v.right_m_s, v.ahead_m_s, v.turn_rad_s};
-    d_.trials.push_back(std::move(t));
-  }
-}
-
-void GroundReport::name_headline() {
-  const bool changes = search_.reference.has_value();
-  if (d_.effects.empty()) {
-    const bool nothing = d_.verdict == Verdict::kNone;
-    d_.headline =
-        changes   ? (nothing ? "Nothing changed by more than a robot does from log to log."
-                             : "Something changed that nothing of the catalogue explains alone.")
-        : nothing ? nothing_wrong(robot_)
-        : something_is_left(figures_)
-            ? "Something is wrong that nothing of the catalogue explains alone."
-            : "Nothing is significantly wrong, but these runs do not exclude it.";
-    if (!d_.findings.empty()) d_.headline += " " + d_.findings.front();
-    if (!unseen_.empty()) d_.headline += " " + unseen_;
-    return;
-  }
-  d_.headline = d_.effects.front().text;
-  if (changes && d_.effects.size() == 1 && !d_.headline.empty()) {
-    d_.headline.back() = ';';
-    d_.headline += d_.verdict == Verdict::kEffect ? " nothing else." : " it does not explain all.";
-  }
-  if (d_.effects.size() > 1) {
-    d_.headline +=
-        " Beside it: " + joined(std::span(d_.effects).subspan(1), ", ", &NamedEffect::name) + ".";
-  }
-}
-
-std::vector<ReportedValue> GroundReport::reported_values() const {
-  std::vector<ReportedValue> values;
-  for (std::size_t j = 0; j < search_.fit.rows.size(); ++j) {
-    const FitRow& row = search_.fit.rows[j];
-    const double had = row.row.nominal, off = search_.fit.values[j] - had;
-    const Interval interval = {intervals_(j, 0), intervals_(j, 1)};
-    // What fits move without its name predicts as well, but costs as many nats as a name.
-    const bool known = search_.unexplained < kUnexplained &&
-                       std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
-                       (interval.lower > had || interval.upper < had);
-    // Against a reference every value is the two logs' own.
-    values.push_back({row.row.name, value_in_file(robot_, row.row.name), search_.fit.values[j],
-                      interval, row.free || known || search_.reference.has_value()});
-    for (const SensorValue& v : search_.sensor) {
-      if (v.row.name != row.row.name) continue;
-      values.back() = {v.row.name, v.had, v.value, v.interval, v.shown};
-    }
-  }
-  return values;
-}
-
-Diagnosis GroundReport::write() {
-  faults();
-  readings();
-  figures_.faults += report_sensor(search_.sensor, &d_);
-  values();
-  const std::size_t values_named = d_.effects.size();
-  if (search_.loop) report_wheel_loop(*search_.loop, search_.reference.has_value(), &d_);
-  figures_.faults += static_cast<int>(d_.effects.size() - values_named);
-  figures();
-  judge();
-  if (const std::string sure = further_values(search_, reported_values()); !sure.empty()) {
-    d_.cautions.push_back(sure);
-  }
-  clocks();
-  screening();
-  trials();
-  name_headline();
-  d_.action = what_to_do(search_, figures_, d_);
-  return std::move(d_);
-}
 
 }  // namespace
 
 GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
                               const GroundDiagnoseOptions& options) {
-  GroundReport report(robot, search, options);
-  GroundDiagnosis result;
-  result.values = report.reported_values();
-  result.diagnosis = report.write();
-  result.figures = report.figures_of();
-  return result;
+  return GroundReport(robot, search, options).write();
 }
 
 }  // namespace gapfarm
