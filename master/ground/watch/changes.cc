@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -11,7 +12,6 @@
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/ground/watch/fleet_steps.h"
-#include "master/ground/watch/mixed_model.h"
 #include "master/infer/certificate.h"
 #include "master/infer/settings.h"
 
@@ -22,6 +22,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+// That offsets of commands differ by from run to run: half a percent of a wheel by a thousandth;
+// fast turns slip as they like.
+constexpr double kOffsetShare = 0.001, kTurnSpeedShare = 0.03;
 constexpr int kWarmRounds = 4;       // from values nearby
 constexpr double kOddWeight = 0.25;  // of a run that is off by itself
 
@@ -40,14 +43,12 @@ ScaledFleet scaled(const WatchedRows& rows, const std::vector<std::vector<Offset
       to.covariances.emplace_back(per.asDiagonal() * run.covariance * per.asDiagonal());
     }
     to.weights.assign(runs.size(), 1);
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-      std::size_t moment = times.empty() ? i : 0;
-      for (const std::vector<double>& of_robot : times) {
-        moment += static_cast<std::size_t>(std::ranges::count_if(
-            of_robot, [&](double t) { return t < times[fleet.robots.size() - 1][i]; }));
-      }
-      to.moments.push_back(moment);
-    }
+    const std::size_t u = fleet.robots.size() - 1;
+    const std::vector<double> all = flattened(times, std::identity());
+    to.moments = mapped(indices(runs.size()), [&](std::size_t i) -> std::size_t {
+      if (times.empty()) return i;
+      return std::ranges::count_if(all, [&](double t) { return t < times[u][i]; });
+    });
   }
   return fleet;
 }
@@ -229,7 +230,6 @@ FleetChanges find_changes(const WatchedRows& rows,
   std::vector<RobotFit> fits = fit_robots(fleet, variances);
   const Shared shared = estimate_shared(fits, fleet.owned, -1);
   const VectorXd units = tolerances_of(rows);
-  result.dispersion = variances.dispersion;
   for (Index k = 0; k < p; ++k) {
     result.shared.push_back(
         {shared.mean[k] * units[k], std::sqrt(shared.covariance(k, k)) * units[k],
@@ -258,6 +258,47 @@ FleetChanges find_changes(const WatchedRows& rows,
     result.odd_robots.push_back(odd);
   }
   return result;
+}
+
+WatchedRows watched_rows(const GroundRobot& robot) {
+  WatchedRows watched;
+  watched.rows = change_rows(robot);
+  std::vector<GroundHypothesis> catalogue = ground_hypotheses(robot);
+  append(catalogue, change_hypotheses(robot, watched.rows));
+  for (KinematicRow& row : command_offsets(robot)) {
+    row.tolerance = row.name.ends_with("_speed") ? kTurnSpeedShare : kOffsetShare;
+    watched.rows.push_back(std::move(row));
+  }
+  const auto p = static_cast<Eigen::Index>(watched.rows.size());
+  watched.owned.resize(p);
+  const std::vector<KinematicRow> kept = kinematic_rows(robot);
+  const auto add = [&](const GroundHypothesis& h, const KinematicRow& row,
+                       Eigen::VectorXd direction) {
+    watched.values.push_back({h.name, row.name, h.thing, row.unit, row.nominal,
+                              plausible_error(row), least_value(row), direction});
+  };
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const KinematicRow& row = watched.rows[k];
+    const KinematicRow* own = find_by(kept, row.name, &KinematicRow::name);
+    watched.owned[k] = (own == nullptr ? row : *own).tolerance;
+    // Wheels that stand farther out turn the robot less far.
+    const bool inverse = row.name == "turn";
+    const std::string name = inverse ? "arm" : row.name;
+    const auto h = std::ranges::find_if(catalogue, [&](const GroundHypothesis& of) {
+      return contains(of.freed, name, &KinematicRow::name);
+    });
+    if (h == catalogue.end()) continue;
+    add(*h, inverse ? h->freed.front() : row, (inverse ? -1 : 1) * Eigen::VectorXd::Unit(p, k));
+  }
+  // All wheels alike.
+  const auto is_wheel = [](const KinematicRow& row) {
+    return contains(std::array{"left", "right", "ahead", "aside", "turn"}, row.name) ? 1.0 : 0.0;
+  };
+  const GroundHypothesis* travel = find_by(catalogue, true, [](const GroundHypothesis& h) {
+    return h.freed.size() == 1 && h.freed[0].name == "travel";
+  });
+  if (travel != nullptr) add(*travel, travel->freed[0], vector_of(watched.rows, is_wheel));
+  return watched;
 }
 
 }  // namespace gapfarm

@@ -77,7 +77,6 @@ struct WatchThresholds {
 };
 
 struct FleetChanges {
-  double dispersion = 1;            // of the runs' own covariances
   std::vector<SharedValue> shared;  // one a row
   WatchThresholds thresholds;
   // Of each robot one a row: what it owns, before its first step, and its standard errors.

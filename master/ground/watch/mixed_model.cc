@@ -1,16 +1,16 @@
-#include "master/ground/watch/mixed_model.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
-#include "common/math/algebra.h"
+#include "common/base/ranges.h"
 #include "common/math/statistics.h"
+#include "master/ground/watch/fleet_steps.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
 
+constexpr double kRunTail = 6;
 constexpr double kPriorRuns = 4;  // of the variances from run to run
 // Values of runs, of the dispersion: what scatters is to be a value's own, not all values'.
 constexpr double kPriorDispersion = 1e4;
@@ -145,13 +145,9 @@ Shared estimate_shared(const std::vector<RobotFit>& fits, const VectorXd& prior,
 double threshold_of(const std::vector<double>& maxima, double alarms) {
   const double from = quantile(maxima, 1 - std::max(kTail, alarms));
   if (alarms >= kTail) return from;
-  double excess = 0, beyond = 0;
-  for (const double m : maxima) {
-    if (m <= from) continue;
-    excess += m - from;
-    beyond += 1;
-  }
-  return from + (beyond > 0 ? excess / beyond : 0) * std::log(kTail / alarms);
+  const auto excess = filtered(mapped(maxima, [&](double m) { return m - from; }),
+                               [](double beyond) { return beyond > 0; });
+  return from + mean(excess) * std::log(kTail / alarms);
 }
 
 }  // namespace gapfarm

@@ -9,7 +9,6 @@
 #include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/math/laws.h"
-#include "master/ground/watch/mixed_model.h"
 #include "master/infer/settings.h"
 #include "master/report/figures/figures.h"
 #include "master/report/page_frame.h"
@@ -67,12 +66,6 @@ std::string odd_run_text(const WatchedFleet& fleet, const OddRun& odd) {
          (last ? "; it is the last one, so the next one shows whether this stays" : "");
 }
 
-std::size_t run_count(const WatchedFleet& fleet) {
-  std::size_t runs = 0;
-  for (const WatchedRobot& robot : fleet.robots) runs += robot.runs.size();
-  return runs;
-}
-
 std::string verdict(const WatchedFleet& fleet, const FleetChanges& changes) {
   const std::string first = first_to_look_at(fleet, changes);
   const bool changed = !changes.steps.empty() || !changes.odd_robots.empty();
@@ -117,19 +110,18 @@ std::string skip_text(const WatchedSkip& skip) {
 }
 
 std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& changes) {
-  const ValueStep* most = nullptr;
-  for (const ValueStep& step : changes.steps) {
-    if (most == nullptr || step.statistic > most->statistic) most = &step;
-  }
-  if (most != nullptr) return run_name(fleet, most->robots.front(), most->onset);
+  const auto most = std::ranges::max_element(changes.steps, {}, &ValueStep::statistic);
+  if (most != changes.steps.end()) return run_name(fleet, most->robots.front(), most->onset);
   if (!changes.odd_robots.empty()) return run_name(fleet, changes.odd_robots.front().robot, 0);
   if (changes.odd_runs.empty()) return "";
   return run_name(fleet, changes.odd_runs.front().robot, changes.odd_runs.front().run);
 }
 
 std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes) {
+  const auto runs =
+      sum_of(fleet.robots, [](const WatchedRobot& robot) { return robot.runs.size(); });
   std::string text = fmt::format("{} robots, {} runs, {} of them fitted now\n", fleet.robots.size(),
-                                 run_count(fleet), fleet.fitted);
+                                 runs, fleet.fitted);
   std::vector<Line> lines = finding_lines(fleet, changes);
   if (!lines.empty()) lines.insert(lines.begin(), kHead);
   std::vector<std::size_t> widths(kHead.size());
@@ -246,7 +238,6 @@ Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
            FieldWriter::list(fleet.skipped, [](auto& v, auto& row) { FIELDS(robot, run, why); })},
           {"false_alarms", changes.thresholds.false_alarms},
           {"thresholds", thresholds},
-          {"dispersion", changes.dispersion},
           {"shared", shared_json(fleet, changes)},
           {"robots", robots_json(fleet, changes)}};
 }
@@ -264,8 +255,8 @@ std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
       "error) moves all its runs alike and is not in it.");
   // What changed first.
   std::vector<std::size_t> order = mapped(changes.steps, &ValueStep::value);
-  for (const OddRobot& odd : changes.odd_robots) order.push_back(odd.value);
-  for (std::size_t k = 0; k < fleet.rows.values.size(); ++k) order.push_back(k);
+  append(order, mapped(changes.odd_robots, &OddRobot::value));
+  append(order, indices(fleet.rows.values.size()));
   std::vector<char> drawn(fleet.rows.values.size(), 0);
   for (const std::size_t k : order) {
     if (drawn[k]++ != 0) continue;
