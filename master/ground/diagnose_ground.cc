@@ -72,8 +72,8 @@ Kinematics chosen_values(const GroundSearch& search, const std::vector<ReportedV
   if (search.reference) search.reference->complete(&at);
   Kinematics kept;
   for (std::size_t k = 0; k < at.names.size(); ++k) {
-    if (search.loop && (at.names[k] == "lag" || at.names[k] == "delay")) continue;
-    kept.add(at.names[k], at.values[static_cast<Eigen::Index>(k)]);
+    const bool before_wheels = at.names[k] == "lag" || at.names[k] == "delay";
+    if (!search.loop || !before_wheels) kept.add(at.names[k], at.values[k]);
   }
   return kept;
 }
@@ -116,6 +116,29 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
   return result;
 }
 
+std::vector<SanityFinding> wrong_way_round(const GroundRobot& robot, const RunLog& log) {
+  GroundQuestion question = ask_what_is_wrong(robot, log);
+  const WindowSettings windows = {{2}, 0.5};
+  const auto found = [&](std::size_t hypothesis, const std::string& evidence) {
+    const GroundHypothesis& h = question.catalogue[hypothesis];
+    return std::vector<SanityFinding>{{h.name, "With " + h.thing + " put right, " + evidence,
+                                       h.remedy, Severity::kWarning, true, h.aliases}};
+  };
+  if (log.relative) {
+    RunLog settled = log;
+    if (!settle_sensor(robot, windows, 1, &settled, &question) || question.faults.empty())
+      return {};
+    return found(question.faults.front().hypothesis,
+                 "increments follow the robot's wheels, else they do not.");
+  }
+  const auto fault = find_ground_fault(robot, log, question, windows);
+  if (!fault) return {};
+  return found(fault->hypothesis,
+               fmt::format("what the robot's file expects is {:.1f} times as near to what was "
+                           "measured.",
+                           fault->shrinks));
+}
+
 constexpr std::size_t kMostOffersReported = 6;
 
 std::string things_of(const GroundSearch& search, const std::vector<std::size_t>& hypotheses) {
@@ -129,6 +152,10 @@ std::size_t to_try(const GroundSearch& search) {
 }
 
 std::string nats_text(double nats) { return fmt::format("{:.1f}", nats); }
+
+void emit(const GroundWork& work, Finding finding) {
+  if (work.on_finding) work.on_finding(std::move(finding));
+}
 
 }  // namespace
 
@@ -162,37 +189,9 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
                            ask_what_is_wrong(driven, wheels));
   });
   if (!result) return result;
-  std::vector<SanityFinding>& sanity = result->diagnosis.sanity;
-  sanity.insert(sanity.end(), checks.findings.begin(), checks.findings.end());
+  append(result->diagnosis.sanity, checks.findings);
   return result;
 }
-
-namespace {
-
-std::vector<SanityFinding> wrong_way_round(const GroundRobot& robot, const RunLog& log) {
-  GroundQuestion question = ask_what_is_wrong(robot, log);
-  const WindowSettings windows = {{2}, 0.5};
-  const auto found = [&](std::size_t hypothesis, const std::string& evidence) {
-    const GroundHypothesis& h = question.catalogue[hypothesis];
-    return std::vector<SanityFinding>{{h.name, "With " + h.thing + " put right, " + evidence,
-                                       h.remedy, Severity::kWarning, true, h.aliases}};
-  };
-  if (log.relative) {
-    RunLog settled = log;
-    if (!settle_sensor(robot, windows, 1, &settled, &question) || question.faults.empty())
-      return {};
-    return found(question.faults.front().hypothesis,
-                 "increments follow the robot's wheels, else they do not.");
-  }
-  const auto fault = find_ground_fault(robot, log, question, windows);
-  if (!fault) return {};
-  return found(fault->hypothesis,
-               fmt::format("what the robot's file expects is {:.1f} times as near to what was "
-                           "measured.",
-                           fault->shrinks));
-}
-
-}  // namespace
 
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
   RunChecks checks = check_runs(log, robot.motors.command_timeout_s);
@@ -201,7 +200,7 @@ std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunL
   std::vector<SanityFinding> findings = wrong_way_round(robot, useful);
   // Headings in degrees jump wherever the robot turns.
   if (findings.empty()) findings = check_jumps(useful).findings;
-  findings.insert(findings.end(), checks.findings.begin(), checks.findings.end());
+  append(findings, checks.findings);
   return findings;
 }
 
@@ -227,14 +226,6 @@ Status read_useful_runs(std::span<const std::string> folders, const WindowSettin
   }
   return set_runs(log, windows, problem);
 }
-
-namespace {
-
-void emit(const GroundWork& work, Finding finding) {
-  if (work.on_finding) work.on_finding(std::move(finding));
-}
-
-}  // namespace
 
 void emit_faults(const GroundWork& work, const GroundSearch& search) {
   const std::string found =

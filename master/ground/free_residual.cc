@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <set>
 #include <string_view>
 
@@ -63,9 +62,8 @@ Length windows_of_length(const WindowFitter& fitter, const WindowFit& fit, int h
     length.data.facts.push_back(facts);
   }
   const std::size_t every = 1 + length.windows.size() / kMostLessons;
-  for (std::size_t k = 0; k < length.windows.size(); ++k) {
-    length.data.learn.push_back(k % every == 0);
-  }
+  length.data.learn =
+      mapped(indices(length.windows.size()), [&](std::size_t k) { return k % every == 0; });
   length.data.free_commands = true;
   return length;
 }
@@ -98,17 +96,15 @@ std::vector<WindowSpeeds> window_speeds(const WindowFitter& fitter, const Window
   const double arm_m =
       fitter.robot().controller.wheel_separation_m.value_or(kUsualSeparation_m) / 2;
   const std::vector<Eigen::Vector3d> raw = fitter.raw_residuals(fit);
-  std::vector<WindowSpeeds> speeds;
-  for (std::size_t i = 0; i < raw.size(); ++i) {
+  return mapped(indices(raw.size()), [&](std::size_t i) -> WindowSpeeds {
     const Trial& trial = fitter.windows().trials[i];
     const Pose way = between(trial.X_WS, expected_end(trial, raw[i]));
     const double half = way.theta / 2;
     const double chord = std::cos(half) * way.x + std::sin(half) * way.y;
     const double arc = std::abs(half) < 1e-6 ? chord : chord * half / std::sin(half);
     const double ahead = arc / *trial.duration_s, turn = way.theta / *trial.duration_s;
-    speeds.push_back({ahead, turn, ahead - arm_m * turn, ahead + arm_m * turn});
-  }
-  return speeds;
+    return {ahead, turn, ahead - arm_m * turn, ahead + arm_m * turn};
+  });
 }
 
 std::optional<FreeResidual> fit_free_residual(const WindowFitter& fitter,
@@ -122,9 +118,8 @@ std::optional<FreeResidual> fit_free_residual(const WindowFitter& fitter,
         fit_residual(length.data, length.residuals, [&](std::size_t) { return length.residuals; });
     for (const ResidualTerm& term : fit.field) {
       for (const std::size_t c : term.covariates) {
-        const auto* label =
-            std::ranges::find(kLabels, residual_covariates()[c].name, &Label::covariate);
-        if (label == std::end(kLabels)) continue;
+        const Label* label = find_by(kLabels, residual_covariates()[c].name, &Label::covariate);
+        if (label == nullptr) continue;
         things.insert(label->thing);
         if (free.covariate.empty()) free.covariate = label->spoken;
       }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -16,7 +15,6 @@
 #include "common/trials/text/csv.h"
 #include "master/ground/fit/kinematic_baseline.h"
 #include "master/ground/fit/window_set.h"
-#include "master/ground/tolerances.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm {
@@ -82,8 +80,7 @@ HorizonRow row_of(std::span<const WindowRow> windows, std::span<const std::size_
   HorizonRow row;
   row.horizon_s = windows.front().horizon_s;
   row.windows = windows.size();
-  std::vector<double> travels = mapped(windows, &WindowRow::travel_m);
-  row.travel_m = median(travels);
+  row.travel_m = median(mapped(windows, &WindowRow::travel_m));
   row.simulation = medians_of(windows, &WindowRow::simulation, row.travel_m);
   row.kinematics = medians_of(windows, &WindowRow::kinematics, row.travel_m);
   row.constant_velocity = medians_of(windows, &WindowRow::constant_velocity, row.travel_m);
@@ -108,20 +105,18 @@ const char* baseline_of(const Horizons& horizons) {
 }
 
 std::string significantly_apart(const Horizons& horizons) {
-  int below = 0, above = 0, untold = 0, all = 0;
+  int below = 0, above = 0, untold = 0;
   for (const HorizonRow& row : horizons.rows) {
     for (const DrawnRatio& drawn : {row.position, row.heading}) {
-      ++all;
       untold += !drawn.interval;
-      if (!drawn.interval) continue;
-      below += (*drawn.interval)[1] < 1;
-      above += (*drawn.interval)[0] > 1;
+      below += drawn.interval && (*drawn.interval)[1] < 1;
+      above += drawn.interval && (*drawn.interval)[0] > 1;
     }
   }
   return fmt::format(
       "of {} medians {} significantly below those of {}, {} significantly above (90 % intervals of "
       "their ratio, by drawing runs again){}\n",
-      all, below, baseline_of(horizons), above,
+      2 * horizons.rows.size(), below, baseline_of(horizons), above,
       untold > 0 ? fmt::format("; {} of too few windows", untold) : "");
 }
 
@@ -152,9 +147,6 @@ std::vector<std::vector<std::size_t>> groups_of(std::span<const std::size_t> run
   }
   return groups;
 }
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr WindowError kFar = {kInfinity, kInfinity};
 
 // Of each trial, nothing where its run's simulation did not end well: each run is a task, so that
 // one that falls over takes no other with it.  Error: none ended well.
@@ -204,12 +196,13 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
       const Trial& trial = asked.log.trials[i];
       const LoggedRun& run = runs.runs[set.run_of[i]];
       const WindowError constant = error_of(constant_end(run, trial), trial);
-      horizons.windows.push_back({set.lengths_s[static_cast<std::size_t>(h)], run.session, run.run,
-                                  *trial.t_s, *trial.duration_s, travel_of(run, trial),
-                                  simulated ? error_of(from_proto(simulated->end()), trial) : kFar,
+      horizons.windows.push_back({set.lengths_s[h], run.session, run.run, *trial.t_s,
+                                  *trial.duration_s, travel_of(run, trial),
+                                  simulated ? error_of(from_proto(simulated->end()), trial)
+                                            : WindowError{INFINITY, INFINITY},
                                   kinematic.empty() ? constant : error_of(kinematic[i], trial),
                                   constant});
-      log_score += simulated ? simulated->log_score() / static_cast<double>(count) : -kInfinity;
+      log_score += simulated ? simulated->log_score() / static_cast<double>(count) : -INFINITY;
     }
     horizons.rows.push_back(row_of(std::span(horizons.windows).subspan(first, count),
                                    std::span(set.run_of).subspan(first, count)));
@@ -249,8 +242,7 @@ std::string format_horizons(const Horizons& horizons) {
   if (!kinematics) return text;
   text += "kinematics:";
   for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {
-    text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i],
-                        horizons.kinematics.values[static_cast<Eigen::Index>(i)]);
+    text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i], horizons.kinematics.values[i]);
   }
   return text + "\n";
 }

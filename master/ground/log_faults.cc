@@ -11,7 +11,6 @@
 #include "master/ground/fit/scans.h"
 #include "master/ground/free_residual.h"
 #include "master/ground/search.h"
-#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
@@ -25,14 +24,9 @@ constexpr std::size_t kFewestApart = 10;
 constexpr double kNoisy = 2;
 
 bool all_alike(const std::vector<CommandedRun>& runs) {
-  const std::vector<double>* first = nullptr;
-  for (const CommandedRun& run : runs) {
-    for (const CommandRow& row : run.commands) {
-      if (first != nullptr && row.values != *first) return false;
-      first = &row.values;
-    }
-  }
-  return true;
+  const auto rows = flattened(runs, &CommandedRun::commands);
+  return std::ranges::all_of(
+      rows, [&](const CommandRow& row) { return row.values == rows.front().values; });
 }
 
 }  // namespace
@@ -95,11 +89,7 @@ namespace {
 // Chained increments lie on no grid, whatever each was rounded to.
 PoseGrid grid_of(const RunLog& log) {
   if (log.relative) return {};
-  std::vector<Pose> all;
-  for (const LoggedRun& run : log.runs) {
-    for (const PoseRow& row : run.poses) all.push_back(row.X_WM);
-  }
-  return pose_grid(all);
+  return pose_grid(mapped(flattened(log.runs, &LoggedRun::poses), &PoseRow::X_WM));
 }
 
 // Frames that repeat the one before say where the robot was, not where it is: they go.
@@ -126,7 +116,7 @@ double objective_with_own_clock(const WindowFitter& fitter, std::vector<FitRow> 
                                 const Eigen::VectorXd& values) {
   const Eigen::Index delay = row_index(rows, "delay");
   if (delay < 0 || fitter.windows().simulated) return kNeverSo;
-  rows[static_cast<std::size_t>(delay)].free = true;
+  rows[delay].free = true;
   return fitter.fit(rows, {}, scan_delay(fitter, rows, values)).objective;
 }
 
@@ -179,7 +169,7 @@ double own_values_shrink(const WindowFitter& fitter, const GroundSearch& search,
   double count = 0;
   for (std::size_t i = 0; i < windows.run_of.size(); ++i) {
     if (windows.run_of[i] != run) continue;
-    others[static_cast<std::size_t>(windows.block[i])] = 0;
+    others[windows.block[i]] = 0;
     count += 1;
   }
   // Few windows are fitted by values of their own whatever they are.
@@ -200,32 +190,24 @@ double own_values_shrink(const WindowFitter& fitter, const GroundSearch& search,
 
 // Of every window: how far it misses, in scales of its length.
 std::vector<double> misses(const WindowFit& fit, const WindowSet& windows) {
-  std::vector<double> missed;
-  for (std::size_t i = 0; i < fit.residuals.size(); ++i) {
-    const Eigen::Vector3d& scale = fit.scales[static_cast<std::size_t>(windows.horizon[i])];
-    missed.push_back(fit.residuals[i].cwiseQuotient(scale).norm());
-  }
-  return missed;
+  return mapped(indices(fit.residuals.size()), [&](std::size_t i) {
+    return fit.residuals[i].cwiseQuotient(fit.scales[windows.horizon[i]]).norm();
+  });
 }
 
 // The windows of a length in which the robot is to move: to drive or to turn half as fast as in
 // the fastest tenth of them.  Where it stands nothing misses.
 std::vector<std::size_t> moving(const std::vector<WindowSpeeds>& speeds, const WindowSet& windows,
                                 int length) {
-  std::vector<std::size_t> of_length;
-  std::vector<double> ahead, turns;
-  for (std::size_t i = 0; i < speeds.size(); ++i) {
-    if (windows.horizon[i] != length) continue;
-    of_length.push_back(i);
-    ahead.push_back(std::abs(speeds[i].ahead_m_s));
-    turns.push_back(std::abs(speeds[i].turn_rad_s));
-  }
+  const auto of_length =
+      filtered(indices(speeds.size()), [&](std::size_t i) { return windows.horizon[i] == length; });
   if (of_length.empty()) return {};
-  const double fast = quantile(ahead, 0.9), turning = quantile(turns, 0.9);
-  std::erase_if(of_length, [&](std::size_t i) {
-    return 2 * std::abs(speeds[i].ahead_m_s) < fast && 2 * std::abs(speeds[i].turn_rad_s) < turning;
-  });
-  return of_length;
+  const auto ahead = [&](std::size_t i) { return std::abs(speeds[i].ahead_m_s); };
+  const auto turn = [&](std::size_t i) { return std::abs(speeds[i].turn_rad_s); };
+  const double fast = quantile(mapped(of_length, ahead), 0.9);
+  const double turning = quantile(mapped(of_length, turn), 0.9);
+  return filtered(of_length,
+                  [&](std::size_t i) { return 2 * ahead(i) >= fast || 2 * turn(i) >= turning; });
 }
 
 // Where many windows miss by far more than half of them do; empty: nowhere.
@@ -239,8 +221,7 @@ std::string far_windows(const WindowFitter& fitter, const GroundSearch& search,
     const std::vector<std::size_t> moves = moving(speeds, windows, length);
     if (moves.size() < kFewestReadings) continue;
     const double middle = median(mapped(moves, [&](std::size_t i) { return missed[i]; }));
-    std::vector<std::size_t> far = moves;
-    std::erase_if(far, [&](std::size_t i) { return missed[i] <= kFarRun * middle; });
+    const auto far = filtered(moves, [&](std::size_t i) { return missed[i] > kFarRun * middle; });
     const double share = static_cast<double>(far.size()) / static_cast<double>(moves.size());
     if (share < most) continue;
     most = share;

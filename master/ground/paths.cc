@@ -34,10 +34,6 @@ Status put_stretches(const RunLog& runs, double every_s, Problem* to, DrivenPath
   return {};
 }
 
-double end_distance(const std::vector<Pose>& a, const std::vector<Pose>& b) {
-  return std::hypot(a.back().x - b.back().x, a.back().y - b.back().y);
-}
-
 }  // namespace
 
 Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const ParameterValues& values,
@@ -50,18 +46,21 @@ Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const Paramet
   for (std::size_t row = 0; row < values.size(); ++row) fits[row] = values[row];
   ASSIGN_OR_RETURN(const auto ends, Predictor(farm, asked).ends({{{}, {}}, {fits, {}}}));
   std::size_t next = 0;
-  std::vector<double> off_before, off_after;
   for (DrivenPath& path : paths.runs) {
     for (std::size_t k = 1; k < path.logged.size(); ++k, ++next) {
       path.before.push_back(ends[0][next]);
       path.after.push_back(ends[1][next]);
     }
-    off_before.push_back(end_distance(path.before, path.logged));
-    off_after.push_back(end_distance(path.after, path.logged));
   }
-  if (off_after.empty()) return paths;
-  paths.before_m = median(off_before);
-  paths.after_m = median(off_after);
+  const auto off = [&](std::vector<Pose> DrivenPath::*driven) {
+    return median(mapped(paths.runs, [&](const DrivenPath& path) {
+      const Pose &a = (path.*driven).back(), &b = path.logged.back();
+      return std::hypot(a.x - b.x, a.y - b.y);
+    }));
+  };
+  if (paths.runs.empty()) return paths;
+  paths.before_m = off(&DrivenPath::before);
+  paths.after_m = off(&DrivenPath::after);
   return paths;
 }
 
@@ -101,10 +100,9 @@ Result<std::vector<SimulatedWindow>> simulate_window(Farm& farm, const Problem& 
 }
 
 std::vector<PathSample> measured_window(const RunLog& log, const Trial& window) {
-  const auto run = std::ranges::find_if(
-      log.runs, [&](const LoggedRun& r) { return session_of(r) == window.session; });
+  const LoggedRun* run = find_by(log.runs, window.session, session_of);
   std::vector<PathSample> path;
-  if (run == log.runs.end()) return path;
+  if (run == nullptr) return path;
   const double end_s = *window.t_s + *window.duration_s;
   constexpr double kSame = 1e-6;  // of a time or a pose that was written and read again
   for (const PoseRow& pose : run->poses) {

@@ -12,7 +12,6 @@
 #include "common/base/guarded.h"
 #include "common/base/ranges.h"
 #include "common/score/kinematic_body.h"
-#include "master/ground/reference.h"
 #include "master/ground/tolerances.h"
 #include "master/infer/fit.h"
 #include "master/infer/predictor.h"
@@ -84,7 +83,7 @@ class ProgramFarm {
       const auto row = problem_.table().find(at.names[k]);
       if (!row) continue;
       const Parameter& p = problem_.table()[*row];
-      values[*row] = std::clamp(at.values[static_cast<Eigen::Index>(k)], p.lower, p.upper);
+      values[*row] = std::clamp(at.values[k], p.lower, p.upper);
     }
     return values;
   }
@@ -138,11 +137,9 @@ KinematicRow channel_row(const Problem& problem, const std::string& channel, con
 
 double root_mean_square(const RunLog& log, std::size_t channel) {
   double sum = 0, count = 1e-9;
-  for (const LoggedRun& run : log.runs) {
-    for (const CommandRow& row : run.commands) {
-      sum += row.values[channel] * row.values[channel];
-      count += 1;
-    }
+  for (const CommandRow& row : flattened(log.runs, &LoggedRun::commands)) {
+    sum += row.values[channel] * row.values[channel];
+    count += 1;
   }
   return std::sqrt(sum / count);
 }
@@ -180,9 +177,8 @@ GroundQuestion question_of_program(const Problem& problem, const GroundRobot& ro
   // The rows of one value are the same to the digit wherever they stand.
   for (GroundHypothesis& h : question.catalogue) {
     for (KinematicRow& freed : h.freed) {
-      for (const KinematicRow& row : question.rows) {
-        if (row.name == freed.name) freed = row;
-      }
+      const KinematicRow* row = find_by(question.rows, freed.name, &KinematicRow::name);
+      if (row != nullptr) freed = *row;
     }
   }
   return question;
@@ -227,7 +223,7 @@ Status tune_program(Farm& farm, const RunLog& log, const GroundDiagnoseOptions& 
   RETURN_IF_ERROR(program.failure());
   for (std::size_t k = 0; k < rows->size(); ++k) {
     KinematicRow& row = (*rows)[k];
-    put_value(row.name, fit.values[static_cast<Eigen::Index>(k)], problem);
+    put_value(row.name, fit.values[k], problem);
     row.nominal = problem->values[problem->table().row(row.name)];
   }
   return {};

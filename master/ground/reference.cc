@@ -104,9 +104,7 @@ std::vector<FitRow> open_rows(const GroundRobot& robot, const std::vector<Kinema
 }
 
 std::vector<FitRow> begun_at(std::vector<FitRow> rows, const Eigen::VectorXd& values) {
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    rows[k].row.nominal = values[k];
-  }
+  for (std::size_t k = 0; k < rows.size(); ++k) rows[k].row.nominal = values[k];
   return rows;
 }
 
@@ -167,22 +165,22 @@ WindowFit open_fit(const WindowFitter& fitter, const GroundRobot& robot,
 
 // A size that is half or twice the file's, or more; -1: none is.
 Eigen::Index another_robots(const WindowFit& fit) {
-  const auto far = [&](const FitRow& row) {
-    const double ratio = fit.values[&row - fit.rows.data()];
-    return row.row.key == "ratio" && (ratio < 1 / kMostRatio || ratio > kMostRatio);
-  };
-  const auto found = std::ranges::find_if(fit.rows, far);
-  return found == fit.rows.end() ? -1 : found - fit.rows.begin();
+  for (Eigen::Index k = 0; k < fit.values.size(); ++k) {
+    const double ratio = fit.values[k];
+    const bool far = ratio < 1 / kMostRatio || ratio > kMostRatio;
+    if (far && fit.rows[k].row.key == "ratio") return k;
+  }
+  return -1;
 }
 
 // Whether values account for where windows end: what is left is small beside the motion, and no
 // wheel has half or twice its size or turns the other way.
 bool explains(const WindowFitter& fitter, const WindowFit& fit) {
-  std::vector<double> ways, turns;
-  for (const Trial& t : fitter.windows().trials) {
-    ways.push_back(std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y));
-    turns.push_back(std::abs(wrap_angle(t.X_WE.theta - t.X_WS.theta)));
-  }
+  const std::vector<Trial>& trials = fitter.windows().trials;
+  const auto ways = mapped(
+      trials, [](const Trial& t) { return std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y); });
+  const auto turns = mapped(
+      trials, [](const Trial& t) { return std::abs(wrap_angle(t.X_WE.theta - t.X_WS.theta)); });
   if (another_robots(fit) >= 0) return false;
   const Eigen::Vector3d& left = fit.scales.front();
   return left.head<2>().maxCoeff() < kExplained * median(ways) &&
@@ -259,9 +257,9 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
 }  // namespace
 
 bool shares_a_clock(const RunLog& log) {
-  return std::all_of(log.runs.begin(), log.runs.end(), [](const LoggedRun& run) {
-    std::set<double> times;
-    for (const CommandRow& row : run.commands) times.insert(row.t_s);
+  return std::ranges::all_of(log.runs, [](const LoggedRun& run) {
+    const std::vector<double> at = mapped(run.commands, &CommandRow::t_s);
+    const std::set<double> times(at.begin(), at.end());
     return !run.poses.empty() && std::all_of(run.poses.begin(), run.poses.end() - 1,
                                              [&](const PoseRow& p) { return times.count(p.t_s); });
   });

@@ -3,7 +3,6 @@
 
 #include "master/ground/report/ground_text.h"
 #include "master/ground/search.h"
-#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
@@ -12,7 +11,7 @@ namespace {
 void take_values(const WindowFit& fit, const std::vector<FitRow>& rows, Eigen::VectorXd* values) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Eigen::Index j = row_index(fit.rows, rows[i].row.name);
-    if (j >= 0) (*values)[static_cast<Eigen::Index>(i)] = fit.values[j];
+    if (j >= 0) (*values)[i] = fit.values[j];
   }
 }
 

@@ -1,9 +1,7 @@
 // Logs that are the wrong way round, or in another unit.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
-#include <iterator>
 #include <numbers>
 #include <string_view>
 #include <utility>
@@ -304,9 +302,8 @@ std::vector<GroundHypothesis> wrong_sides_of_poses() {
 
 std::vector<GroundHypothesis> wrong_log(const GroundRobot& robot) {
   Faults all = wrong_commands(robot);
-  for (Faults& more : std::array{wrong_units_of_commands(robot), wrong_poses()}) {
-    std::ranges::move(more, std::back_inserter(all));
-  }
+  append(all, wrong_units_of_commands(robot));
+  append(all, wrong_poses());
   all.push_back(
       fault("increments_in_world", {"axes_turned"},
             "the axes of the increments: they are the world's, not the robot's",

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/base/constants.h"
+#include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/hypotheses.h"
@@ -51,8 +52,7 @@ std::vector<Vector2d> wheel_places(const WindowFitter& fitter) {
 
 // The places' distances along a direction, ascending.
 std::vector<double> along(const std::vector<Vector2d>& places, const Vector2d& direction) {
-  std::vector<double> distances;
-  for (const Vector2d& place : places) distances.push_back(place.dot(direction));
+  auto distances = mapped(places, [&](const Vector2d& place) { return place.dot(direction); });
   std::ranges::sort(distances);
   return distances;
 }
@@ -64,11 +64,8 @@ double at_share(const std::vector<double>& ascending, double share) {
 double scatter_of(const std::vector<Vector2d>& places) {
   const auto n = static_cast<double>(places.size());
   Vector2d sum(0, 0);
-  double squares = 0;
-  for (const Vector2d& place : places) {
-    sum += place;
-    squares += place.squaredNorm();
-  }
+  for (const Vector2d& place : places) sum += place;
+  const double squares = sum_of(places, [](const Vector2d& place) { return place.squaredNorm(); });
   return std::sqrt(squares / n - (sum / n).squaredNorm());
 }
 
@@ -168,7 +165,7 @@ VectorXd best_region(const Region& region, const WindowFitter& fitter, const Win
     // Nothing may draw a border away from there while both floors are one.
     std::vector<FitRow> from_there = rows;
     for (Eigen::Index r = fit.values.size(); r < ratio; ++r) {
-      from_there[static_cast<std::size_t>(r)].row.nominal = start[r];
+      from_there[r].row.nominal = start[r];
     }
     const WindowFit climbed = fitter.fit(from_there, {}, start, kClimbingRounds);
     if (!parts(places, region, rows, climbed.values)) continue;

@@ -7,10 +7,9 @@
 #include <cctype>
 #include <cmath>
 
+#include "common/base/constants.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/math/laws.h"
-#include "master/ground/tolerances.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm {
@@ -25,18 +24,15 @@ std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Est
   };
   const auto& k = robot.controller;
   const double base = row.nominal;
-  for (const RobotWheel& w : robot.wheels) {
-    if (row.name == radius_row(w)) return ratio(row.name, *w.radius_m, " m");
-  }
+  const RobotWheel* wheel = find_by(robot.wheels, row.name, radius_row);
+  if (wheel != nullptr) return ratio(row.name, *wheel->radius_m, " m");
   if (row.name == "left" || row.name == "right") {
     return ratio("wheels." + row.name + ".radius", side_radius_m(robot, row.name), " m");
   }
   if (row.name == "separation" && k.wheel_separation_m) {
     const double own = turning_multiplier(robot);
-    if (own != 1 || skids(robot)) {
-      return ratio("wheel_separation_multiplier", own, "");
-    }
-    return ratio("wheel_separation", *k.wheel_separation_m, " m");
+    return own != 1 || skids(robot) ? ratio("wheel_separation_multiplier", own, "")
+                                    : ratio("wheel_separation", *k.wheel_separation_m, " m");
   }
   if (e.key == "ratio" || e.key == "rate") {
     return with_interval("%+.4g", e.value, e.lo, e.hi) + " " +
@@ -160,15 +156,14 @@ int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis) 
   if (pose.empty()) return 0;
   diagnosis->cautions.push_back("The sensor's pose was fitted first, with every value free:" +
                                 pose);
-  int off = 0;
+  const std::size_t before = diagnosis->effects.size();
   for (NamedEffect* effect : {&yaw, &offset}) {
     if (effect->parameters.empty()) continue;
     effect->text += ".";
     effect->confidence = kSensorSure;
     diagnosis->effects.push_back(std::move(*effect));
-    ++off;
   }
-  return off;
+  return static_cast<int>(diagnosis->effects.size() - before);
 }
 
 bool may_be_named(const HeldOutGain& gain) { return std::isfinite(gain.lo) && gain.lo > 0; }
@@ -237,14 +232,14 @@ std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& sea
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     const std::string& name = fit.rows[k].row.name;
     const Eigen::Index named = row_index(search.fit.rows, name);
-    if (named >= 0 && search.fit.rows[static_cast<std::size_t>(named)].free) continue;
+    if (named >= 0 && search.fit.rows[named].free) continue;
     // What lies before measured wheel speeds is a caution of its own.
     if (fitter.robot().measured && (name == "lag" || name == "delay")) continue;
     if (draws.row(k).norm() / root < kUnshown * prior_deviation(fit.rows[k])) continue;
-    const auto of = std::ranges::find_if(search.catalogue, [&](const GroundHypothesis& h) {
+    const GroundHypothesis* of = find_by(search.catalogue, true, [&](const GroundHypothesis& h) {
       return contains(h.freed, name, &KinematicRow::name);
     });
-    if (of != search.catalogue.end() && !contains(things, of->thing)) things.push_back(of->thing);
+    if (of != nullptr && !contains(things, of->thing)) things.push_back(of->thing);
   }
   if (things.empty()) return "";
   return "These runs do not show whether these are right: " + joined(things) + ".";
@@ -269,8 +264,8 @@ std::string further_values(const GroundSearch& search, const std::vector<Reporte
   std::vector<std::string> sure;
   for (std::size_t j = 0; j < values.size(); ++j) {
     const ReportedValue& v = values[j];
-    const bool sensed = std::ranges::any_of(
-        search.sensor, [&](const SensorValue& of) { return of.row.name == v.name; });
+    const bool sensed =
+        contains(search.sensor, v.name, [](const SensorValue& of) { return of.row.name; });
     if (!v.named || search.fit.rows[j].free || sensed) continue;
     sure.push_back(
         fmt::format("{} {} in place of {:.4g}", v.name,
@@ -281,25 +276,19 @@ std::string further_values(const GroundSearch& search, const std::vector<Reporte
 }
 
 std::vector<std::string> cautions_of(const GroundRobot& robot, const GroundSearch& search) {
-  std::vector<std::string> cautions;
-  if (search.reference) {
-    cautions.push_back(
-        "Against the reference's log: sizes and intervals are of the change, what the reference "
-        "leaves unsure is in them.");
-  }
-  if (search.windows.blocks < 8) {
-    cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
-  }
-  if (search.log.relative) {
-    cautions.push_back(
-        "Poses are relative, each to the one before: nothing with a place or a direction in the "
-        "world can show (tilts, patches, edges); lengths are as the sensor's own scale has them.");
-  }
-  if (robot.measured && !search.loop) {
-    cautions.push_back(
-        "Wheel speeds were measured: what lies before them (dead time, ramps) cannot show.");
-  }
-  return cautions;
+  using Caution = std::pair<bool, std::string>;
+  const Caution all[] = {
+      {search.reference.has_value(),
+       "Against the reference's log: sizes and intervals are of the change, what the reference "
+       "leaves unsure is in them."},
+      {search.windows.blocks < 8,
+       "Few runs: intervals are from runs drawn again, and these are few."},
+      {search.log.relative,
+       "Poses are relative, each to the one before: nothing with a place or a direction in the "
+       "world can show (tilts, patches, edges); lengths are as the sensor's own scale has them."},
+      {robot.measured && !search.loop,
+       "Wheel speeds were measured: what lies before them (dead time, ramps) cannot show."}};
+  return filtered(all, &Caution::first, &Caution::second);
 }
 
 std::string what_to_do(const GroundSearch& search, const GroundFigures& figures,

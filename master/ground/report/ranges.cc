@@ -69,15 +69,14 @@ Eigen::MatrixXd correlation_of(const Ranges& ranges) {
   return r;
 }
 
-Json held_json(const Ranges& ranges) {
+Json held_json(const GroundRobot& robot) {
   Json held = Json::array();
-  if (!ranges.robot) return held;
   const auto add = [&](const char* name, const char* unit, std::optional<double> value) {
     if (value) held.push_back({{"name", name}, {"unit", unit}, {"value", *value}});
   };
-  add("friction", "-", ranges.robot->friction);
-  add("mass", "kg", ranges.robot->mass_kg);
-  add("yaw_inertia", "kg m^2", ranges.robot->yaw_inertia_kg_m2);
+  add("friction", "-", robot.friction);
+  add("mass", "kg", robot.mass_kg);
+  add("yaw_inertia", "kg m^2", robot.yaw_inertia_kg_m2);
   return held;
 }
 
@@ -88,9 +87,8 @@ bool is_table(const Json& value) {
 }  // namespace
 
 Interval interval_of(const GroundReference& fit, Eigen::Index k) {
-  std::vector<double> drawn;
-  for (const double off : fit.draws.row(k)) drawn.push_back(fit.values[k] + off);
-  return interval_about(fit.values[k], std::move(drawn));
+  return interval_about(fit.values[k],
+                        mapped(fit.draws.row(k), [&](double off) { return fit.values[k] + off; }));
 }
 
 Ranges ranges_of(const GroundRobot& robot, const GroundReference& fit) {
@@ -123,14 +121,10 @@ Result<Ranges> ranges_of(const Diagnosis& diagnosis) {
   Ranges ranges;
   for (const ParameterRow& row : diagnosis.parameters) {
     if (!row.lo || !row.hi || !(*row.hi > *row.lo)) continue;
-    ranges.values.push_back({row.key,
-                             row.unit,
-                             row.after,
-                             (*row.hi - *row.lo) / 2 / kNormal90,
-                             {*row.lo, *row.hi},
-                             row.lower,
-                             row.upper,
-                             row.before});
+    const double sd = (*row.hi - *row.lo) / 2 / kNormal90;
+    const Interval interval = {*row.lo, *row.hi};
+    ranges.values.push_back(
+        {row.key, row.unit, row.after, sd, interval, row.lower, row.upper, row.before});
   }
   if (ranges.values.empty()) {
     return Error{"the diagnosis has no parameter with an interval; tune some ([genes])"};
@@ -138,12 +132,11 @@ Result<Ranges> ranges_of(const Diagnosis& diagnosis) {
   const auto n = static_cast<Eigen::Index>(ranges.values.size());
   Eigen::MatrixXd r = Eigen::MatrixXd::Identity(n, n);
   const auto index = [&](const std::string& key) {
-    const auto found = std::ranges::find(ranges.values, key, &ValueRange::name);
-    return found == ranges.values.end() ? -1 : found - ranges.values.begin();
+    return std::ranges::find(ranges.values, key, &ValueRange::name) - ranges.values.begin();
   };
   for (const ParameterCorrelation& c : diagnosis.correlations) {
     const auto a = index(c.a), b = index(c.b);
-    if (a >= 0 && b >= 0 && a != b) r(a, b) = r(b, a) = c.r;
+    if (a < n && b < n && a != b) r(a, b) = r(b, a) = c.r;
   }
   const Eigen::VectorXd sd = vector_of(ranges.values, &ValueRange::sd);
   ranges.covariance = sd.asDiagonal() * r * sd.asDiagonal();
@@ -179,7 +172,7 @@ GroundRobot robot_at(const Ranges& ranges, const Eigen::VectorXd& values) {
   Kinematics at;
   for (std::size_t k = 0; k < ranges.values.size(); ++k) {
     const ValueRange& range = ranges.values[k];
-    at.add(range.kinematic, values[static_cast<Eigen::Index>(k)] / range.factor);
+    at.add(range.kinematic, values[k] / range.factor);
   }
   return robot_with(*ranges.robot, at);
 }
@@ -208,7 +201,9 @@ Json ranges_json(const Ranges& ranges) {
     if (ranges.robot) row["error"] = v.error, row["varies"] = v.varies;
     values.push_back(placed(std::move(row)));
   }
-  for (const Json& row : held_json(ranges)) held.push_back(placed(row));
+  for (const Json& row : ranges.robot ? held_json(*ranges.robot) : Json::array()) {
+    held.push_back(placed(row));
+  }
   for (const WindowScatter& s : ranges.scatter) {
     scatter.push_back({{"window_s", s.window_s},
                        {"along_m", s.sd[0]},

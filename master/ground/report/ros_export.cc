@@ -6,13 +6,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/constants.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/robot/robot.h"
 #include "common/score/kinematic.h"
 #include "common/score/kinematic_body.h"
-#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
@@ -33,7 +33,7 @@ ReportedValue product(const ReportedValues& reported, const std::string& key, do
                       std::optional<double> known = {}) {
   const double file = known.value_or(had);
   ReportedValue row{key, had, file, {file, file}, file != had};
-  double least = file, most = file;
+  auto& [least, most] = row.interval;
   const auto take = [&](const char* name, bool divide) {
     const ReportedValue* v = named_value(reported, name);
     if (v == nullptr || v->reported <= 0 || v->interval.lower <= 0) return;
@@ -44,7 +44,6 @@ ReportedValue product(const ReportedValues& reported, const std::string& key, do
   };
   for (const char* name : over) take(name, false);
   for (const char* name : under) take(name, true);
-  row.interval = {least, most};
   return row;
 }
 
@@ -139,9 +138,7 @@ std::vector<ReportedValue> robot_sizes(const ReportedValues& reported) {
 
 std::vector<std::string> ros_remarks(const ReportedValues& reported) {
   struct Word {
-    const char* name;
-    const char* text;
-    const char* unit;
+    const char *name, *text, *unit;
   };
   constexpr Word kLabels[] = {
       {"steering_offset", "trim of the steering: the wheels point this way when commanded straight",

@@ -5,7 +5,6 @@
 #include <string>
 #include <string_view>
 
-#include "common/base/result.h"
 #include "common/robot/robot.h"
 
 namespace gapfarm {
