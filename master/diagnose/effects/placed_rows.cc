@@ -99,29 +99,6 @@ EffectDiagnosis first_seam() {
   };
 }
 
-}  // namespace
-
-extern const EffectDiagnosis kCameraDistortion = {
-    .effect = "camera_distortion",
-    .searched = {{"k1", 0.05}, {"x", 0.1}, {"y", 0.1}},
-    .probes = [](const Study& study) { return lens_probes(middle_of(study)); },
-    .bends_view = true,
-    .start = start_lens,
-    .model_error = 0.03,
-    .places = {{"x", 0}, {"y", 1}},
-    .phrases = {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
-                {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}},
-                "Calibrate the lens",
-                "The camera's lens bends positions"},
-};
-
-extern const EffectDiagnosis kCameraSeam = first_seam();
-extern const EffectDiagnosis kCameraSeam2 = second_of_a_kind(
-    first_seam(), "camera_seam_2",
-    "Beyond a second seam at %a = %1 the poses are shifted by %2 in x and %3 in y, too");
-
-namespace {
-
 // At its edge a small error of the place is a large one of the motion.
 bool contaminated_at_edge(const Signature& chosen, const ResidualTrial& trial) {
   constexpr double kEdge_m = 0.1;
@@ -129,28 +106,6 @@ bool contaminated_at_edge(const Signature& chosen, const ResidualTrial& trial) {
   const Patch patch = patch_of(chosen);
   return nearest_on_segment({patch[0], patch[1]}, from, to).distance < patch[2] + kEdge_m;
 }
-
-}  // namespace
-
-Patch patch_of(const Signature& s) {
-  const auto value = [&](const char* key) { return s.fixed.at(s.effect + "." + key); };
-  return {value("x"), value("y"), value("radius"), value("ratio")};
-}
-
-std::map<std::string, double> patch_values(const Patch& patch) {
-  return {{"friction_patch.ratio", patch[3]},
-          {"friction_patch.x", patch[0]},
-          {"friction_patch.y", patch[1]},
-          {"friction_patch.radius", patch[2]}};
-}
-
-double patch_search_error(const Parameter& p, double value, double gain) {
-  const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
-  return p.key == p.effect + ".ratio" ? kPatchRatio * weakness * (value - p.nominal)
-                                      : kPatchPlace_m * weakness;
-}
-
-namespace {
 
 // Looked for by its place: what a sketch proposes is simulated (patch.h).
 EffectDiagnosis first_patch() {
@@ -173,6 +128,43 @@ EffectDiagnosis first_patch() {
 }
 
 }  // namespace
+
+extern const EffectDiagnosis kCameraDistortion = {
+    .effect = "camera_distortion",
+    .searched = {{"k1", 0.05}, {"x", 0.1}, {"y", 0.1}},
+    .probes = [](const Study& study) { return lens_probes(middle_of(study)); },
+    .bends_view = true,
+    .start = start_lens,
+    .model_error = 0.03,
+    .places = {{"x", 0}, {"y", 1}},
+    .phrases = {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
+                {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}},
+                "Calibrate the lens",
+                "The camera's lens bends positions"},
+};
+
+extern const EffectDiagnosis kCameraSeam = first_seam();
+extern const EffectDiagnosis kCameraSeam2 = second_of_a_kind(
+    first_seam(), "camera_seam_2",
+    "Beyond a second seam at %a = %1 the poses are shifted by %2 in x and %3 in y, too");
+
+Patch patch_of(const Signature& s) {
+  const auto value = [&](const char* key) { return s.fixed.at(s.effect + "." + key); };
+  return {value("x"), value("y"), value("radius"), value("ratio")};
+}
+
+std::map<std::string, double> patch_values(const Patch& patch) {
+  return {{"friction_patch.ratio", patch[3]},
+          {"friction_patch.x", patch[0]},
+          {"friction_patch.y", patch[1]},
+          {"friction_patch.radius", patch[2]}};
+}
+
+double patch_search_error(const Parameter& p, double value, double gain) {
+  const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
+  return p.key == p.effect + ".ratio" ? kPatchRatio * weakness * (value - p.nominal)
+                                      : kPatchPlace_m * weakness;
+}
 
 extern const EffectDiagnosis kFrictionPatch = first_patch();
 extern const EffectDiagnosis kFrictionPatch2 =

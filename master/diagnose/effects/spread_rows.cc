@@ -87,21 +87,6 @@ const SpreadRow kSlipSpread = {
     .write = write_slips,
 };
 
-}  // namespace
-
-extern const EffectDiagnosis kSlipEvents = {
-    .effect = "slip_events",
-    .phrases = {"Each side slips in %1 of the trials and loses up to %2 of its speed",
-                {{"probability", 100, " %"}, {"loss", 100, " %"}},
-                "Clean the treads and the floor",
-                "Each side slips in %1 of the drives"},
-    .spread = &kSlipSpread,
-    .found = "by the tails of what is left",
-    .missing = "single drives are no outliers as slips would make them",
-};
-
-namespace {
-
 constexpr double kTriedShares[] = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7};
 
 bool follows_move(const ResidualTrial& trial) { return trial.context.moved; }
@@ -212,6 +197,17 @@ const SpreadRow kSessionSpread = {
 };
 
 }  // namespace
+
+extern const EffectDiagnosis kSlipEvents = {
+    .effect = "slip_events",
+    .phrases = {"Each side slips in %1 of the trials and loses up to %2 of its speed",
+                {{"probability", 100, " %"}, {"loss", 100, " %"}},
+                "Clean the treads and the floor",
+                "Each side slips in %1 of the drives"},
+    .spread = &kSlipSpread,
+    .found = "by the tails of what is left",
+    .missing = "single drives are no outliers as slips would make them",
+};
 
 extern const EffectDiagnosis kUnsettledStart = {
     .effect = "unsettled_start",
