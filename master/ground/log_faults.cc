@@ -29,63 +29,6 @@ bool all_alike(const std::vector<CommandedRun>& runs) {
       rows, [&](const CommandRow& row) { return row.values == rows.front().values; });
 }
 
-}  // namespace
-
-Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog& log,
-                                          const WindowSettings& settings) const {
-  auto set = window_set(robot, log, settings);
-  if (set && simulation) set->simulated = simulation(*set);
-  return set;
-}
-
-std::optional<GroundFault> best_fault(
-    const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
-    const WindowSettings& settings, double before, bool anywhere, std::span<const FoundFault> found,
-    const std::function<double(const WindowFitter&, const RunLog&)>& objective_of) {
-  std::optional<GroundFault> best;
-  for (std::size_t i = 0; i < question.catalogue.size(); ++i) {
-    const GroundHypothesis& h = question.catalogue[i];
-    if (!h.put_right || (anywhere && h.of_world)) continue;
-    // One column has one unit.
-    const auto is_again = [&](const FoundFault& f) {
-      const GroundHypothesis& other = question.catalogue[f.hypothesis];
-      return other.name == h.name && other.aliases == h.aliases;
-    };
-    if (std::ranges::any_of(found, is_again)) continue;
-    GroundFault fault{{i, 0}, 1, log, 0};
-    h.put_right(&fault.log);
-    const auto windows = question.windows(robot, fault.log, settings);
-    if (!windows) continue;
-    const double stretches = windows->stretches();
-    const WindowFitter fitter(robot, *windows, question.reference);
-    // Densities are of what was logged, in its own unit.
-    fault.objective =
-        objective_of(fitter, fault.log) + stretches * std::log(h.metres * h.metres * h.radians);
-    fault.gain = fault.objective - before;
-    fault.shrinks = std::exp(fault.gain / (3 * stretches));
-    if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;
-    if (!best || fault.gain > best->gain) best = std::move(fault);
-  }
-  return best;
-}
-
-std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
-                                             const GroundQuestion& question,
-                                             const WindowSettings& settings,
-                                             std::span<const FoundFault> found) {
-  const std::vector<FitRow> rows = held_rows(question.rows);
-  const auto objective_of = [&](const WindowFitter& fitter, const RunLog&) {
-    return fitter.hold(rows, nominals(rows)).objective;
-  };
-  const auto as_logged = question.windows(robot, log, settings);
-  if (!as_logged) return std::nullopt;
-  const double before = objective_of(WindowFitter(robot, *as_logged, question.reference), log);
-  return best_fault(robot, log, question, settings, before, /*anywhere=*/false, found,
-                    objective_of);
-}
-
-namespace {
-
 // Chained increments lie on no grid, whatever each was rounded to.
 PoseGrid grid_of(const RunLog& log) {
   if (log.relative) return {};
@@ -119,47 +62,6 @@ double objective_with_own_clock(const WindowFitter& fitter, std::vector<FitRow> 
   rows[delay].free = true;
   return fitter.fit(rows, {}, scan_delay(fitter, rows, values)).objective;
 }
-
-}  // namespace
-
-Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
-                     const GroundWork& work, GroundSearch* search) {
-  drop_stale_frames(search);
-  for (;;) {
-    const bool settled = !question.sensor.empty() || search->faults.size() >= kMostFaults;
-    auto fault =
-        settled ? std::nullopt
-                : find_ground_fault(robot, search->log, question, work.windows, search->faults);
-    ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, work.windows));
-    search->windows = std::move(windows);
-    const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
-    search->fit = fitter.fit(held_rows(question.rows));
-    if (!fault) break;
-    // Values a little off must not do as well, nor must a clock that is far off.
-    if (fault->objective < search->fit.objective) break;
-    const double delayed = objective_with_own_clock(fitter, search->fit.rows, search->fit.values);
-    if (fault->objective < delayed) break;
-    search->faults.push_back(*fault);
-    search->log = std::move(fault->log);
-  }
-  search->jumps = check_jumps(search->log);
-  if (!search->jumps.false_poses.empty()) {
-    search->log = without(std::move(search->log), search->jumps);
-    ASSIGN_OR_RETURN(search->windows, question.windows(robot, search->log, work.windows));
-    search->fit =
-        WindowFitter(robot, search->windows, question.reference, work.memo).fit(search->fit.rows);
-  }
-  if (!search->windows.noise.empty()) {
-    const WindowFitter as_stated(robot, search->windows, question.reference, work.memo);
-    search->windows.least_noise = as_stated.likeliest_least_noise(search->fit);
-    const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
-    search->fit = fitter.fit(search->fit.rows);
-  }
-  search->grid = grid_of(search->log);  // in metres by now
-  return {};
-}
-
-namespace {
 
 // How much closer a run is to what its own values expect than to those of all runs: the ratio of
 // its residuals, where the nats are no chance; 1: no closer.
@@ -238,6 +140,96 @@ std::string far_windows(const WindowFitter& fitter, const GroundSearch& search,
 }
 
 }  // namespace
+
+Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog& log,
+                                          const WindowSettings& settings) const {
+  auto set = window_set(robot, log, settings);
+  if (set && simulation) set->simulated = simulation(*set);
+  return set;
+}
+
+std::optional<GroundFault> best_fault(
+    const GroundRobot& robot, const RunLog& log, const GroundQuestion& question,
+    const WindowSettings& settings, double before, bool anywhere, std::span<const FoundFault> found,
+    const std::function<double(const WindowFitter&, const RunLog&)>& objective_of) {
+  std::optional<GroundFault> best;
+  for (std::size_t i = 0; i < question.catalogue.size(); ++i) {
+    const GroundHypothesis& h = question.catalogue[i];
+    if (!h.put_right || (anywhere && h.of_world)) continue;
+    // One column has one unit.
+    const auto is_again = [&](const FoundFault& f) {
+      const GroundHypothesis& other = question.catalogue[f.hypothesis];
+      return other.name == h.name && other.aliases == h.aliases;
+    };
+    if (std::ranges::any_of(found, is_again)) continue;
+    GroundFault fault{{i, 0}, 1, log, 0};
+    h.put_right(&fault.log);
+    const auto windows = question.windows(robot, fault.log, settings);
+    if (!windows) continue;
+    const double stretches = windows->stretches();
+    const WindowFitter fitter(robot, *windows, question.reference);
+    // Densities are of what was logged, in its own unit.
+    fault.objective =
+        objective_of(fitter, fault.log) + stretches * std::log(h.metres * h.metres * h.radians);
+    fault.gain = fault.objective - before;
+    fault.shrinks = std::exp(fault.gain / (3 * stretches));
+    if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;
+    if (!best || fault.gain > best->gain) best = std::move(fault);
+  }
+  return best;
+}
+
+std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
+                                             const GroundQuestion& question,
+                                             const WindowSettings& settings,
+                                             std::span<const FoundFault> found) {
+  const std::vector<FitRow> rows = held_rows(question.rows);
+  const auto objective_of = [&](const WindowFitter& fitter, const RunLog&) {
+    return fitter.hold(rows, nominals(rows)).objective;
+  };
+  const auto as_logged = question.windows(robot, log, settings);
+  if (!as_logged) return std::nullopt;
+  const double before = objective_of(WindowFitter(robot, *as_logged, question.reference), log);
+  return best_fault(robot, log, question, settings, before, /*anywhere=*/false, found,
+                    objective_of);
+}
+
+Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
+                     const GroundWork& work, GroundSearch* search) {
+  drop_stale_frames(search);
+  for (;;) {
+    const bool settled = !question.sensor.empty() || search->faults.size() >= kMostFaults;
+    auto fault =
+        settled ? std::nullopt
+                : find_ground_fault(robot, search->log, question, work.windows, search->faults);
+    ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, work.windows));
+    search->windows = std::move(windows);
+    const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
+    search->fit = fitter.fit(held_rows(question.rows));
+    if (!fault) break;
+    // Values a little off must not do as well, nor must a clock that is far off.
+    if (fault->objective < search->fit.objective) break;
+    const double delayed = objective_with_own_clock(fitter, search->fit.rows, search->fit.values);
+    if (fault->objective < delayed) break;
+    search->faults.push_back(*fault);
+    search->log = std::move(fault->log);
+  }
+  search->jumps = check_jumps(search->log);
+  if (!search->jumps.false_poses.empty()) {
+    search->log = without(std::move(search->log), search->jumps);
+    ASSIGN_OR_RETURN(search->windows, question.windows(robot, search->log, work.windows));
+    search->fit =
+        WindowFitter(robot, search->windows, question.reference, work.memo).fit(search->fit.rows);
+  }
+  if (!search->windows.noise.empty()) {
+    const WindowFitter as_stated(robot, search->windows, question.reference, work.memo);
+    search->windows.least_noise = as_stated.likeliest_least_noise(search->fit);
+    const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
+    search->fit = fitter.fit(search->fit.rows);
+  }
+  search->grid = grid_of(search->log);  // in metres by now
+  return {};
+}
 
 std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
   const WindowSet& windows = search.windows;

@@ -15,38 +15,6 @@ void take_values(const WindowFit& fit, const std::vector<FitRow>& rows, Eigen::V
   }
 }
 
-}  // namespace
-
-bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
-                    std::size_t index, const WindowFit& fit) {
-  const GroundHypothesis& hypothesis = search.catalogue[index];
-  const double kept = search.reference ? hypothesis.kept : 0;
-  const auto shows = [&](const Estimate& size) { return size.lo > kept || size.hi < -kept; };
-  if (hypothesis.describe) {
-    NamedEffect effect;
-    hypothesis.describe(fitter, fit, work.seed, &effect);
-    return shows(effect.parameters.front());
-  }
-  const Eigen::MatrixX2d intervals = fitter.intervals(fit, work.seed);
-  return std::ranges::any_of(hypothesis.freed, [&](const KinematicRow& row) {
-    const Eigen::Index i = row_index(fit.rows, row.name);
-    return shows({row.key, 0, intervals(i, 0) - row.nominal, intervals(i, 1) - row.nominal, ""});
-  });
-}
-
-WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,
-                        const std::vector<std::size_t>& hypotheses, const WindowFit& fit) {
-  std::vector<FitRow> rows;
-  Eigen::VectorXd start;
-  for (const std::size_t h : hypotheses) {
-    rows = with_freed(std::move(rows), search.catalogue[h], &start);
-  }
-  take_values(fit, rows, &start);
-  return fit_held_out(fitter, rows, start);
-}
-
-namespace {
-
 // What the search has where only these are named, in this order; `unnamed`: before the first.
 GroundNames with_names(const WindowFitter& fitter, const GroundWork& work,
                        const GroundSearch& search, const GroundNames& unnamed,
@@ -108,6 +76,34 @@ void drop_where_not(const WindowFitter& fitter, const GroundWork& work, const Gr
 }
 
 }  // namespace
+
+bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
+                    std::size_t index, const WindowFit& fit) {
+  const GroundHypothesis& hypothesis = search.catalogue[index];
+  const double kept = search.reference ? hypothesis.kept : 0;
+  const auto shows = [&](const Estimate& size) { return size.lo > kept || size.hi < -kept; };
+  if (hypothesis.describe) {
+    NamedEffect effect;
+    hypothesis.describe(fitter, fit, work.seed, &effect);
+    return shows(effect.parameters.front());
+  }
+  const Eigen::MatrixX2d intervals = fitter.intervals(fit, work.seed);
+  return std::ranges::any_of(hypothesis.freed, [&](const KinematicRow& row) {
+    const Eigen::Index i = row_index(fit.rows, row.name);
+    return shows({row.key, 0, intervals(i, 0) - row.nominal, intervals(i, 1) - row.nominal, ""});
+  });
+}
+
+WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,
+                        const std::vector<std::size_t>& hypotheses, const WindowFit& fit) {
+  std::vector<FitRow> rows;
+  Eigen::VectorXd start;
+  for (const std::size_t h : hypotheses) {
+    rows = with_freed(std::move(rows), search.catalogue[h], &start);
+  }
+  take_values(fit, rows, &start);
+  return fit_held_out(fitter, rows, start);
+}
 
 void drop_again(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
                 GroundSearch* search) {

@@ -64,83 +64,6 @@ std::vector<StepCandidate> steps_in(const ScaledFleet& fleet, const RunVariances
   return best;
 }
 
-}  // namespace
-
-std::size_t run_from(const RobotRuns& robot, std::size_t moment) {
-  return static_cast<std::size_t>(std::ranges::lower_bound(robot.moments, moment) -
-                                  robot.moments.begin());
-}
-
-PooledScores pool_scores(const ScaledFleet& fleet, const std::vector<std::size_t>& robots,
-                         const std::vector<std::vector<std::vector<StepScore>>>& of_robots) {
-  PooledScores pooled;
-  for (const std::size_t u : robots) append(pooled.moments, fleet.robots[u].moments);
-  std::ranges::sort(pooled.moments);
-  pooled.moments.erase(std::unique(pooled.moments.begin(), pooled.moments.end()),
-                       pooled.moments.end());
-  pooled.scores.assign(fleet.directions.size(), std::vector<StepScore>(pooled.moments.size()));
-  for (const std::size_t u : robots) {
-    for (std::size_t m = 0; m < pooled.moments.size(); ++m) {
-      const std::size_t run = run_from(fleet.robots[u], pooled.moments[m]);
-      for (std::size_t k = 0; k < pooled.scores.size(); ++k) {
-        if (run >= of_robots[u][k].size()) continue;
-        const StepScore& own = of_robots[u][k][run];
-        StepScore& sum = pooled.scores[k][m];
-        sum.precision += own.precision;
-        if (own.precision > 0)
-          sum.change += (own.change - sum.change) * own.precision / sum.precision;
-      }
-    }
-  }
-  return pooled;
-}
-
-StepCandidate best_of(const std::vector<StepCandidate>& steps,
-                      const std::vector<double>& thresholds) {
-  const auto beyond = [&](const StepCandidate& step) {
-    return step.statistic - (thresholds.empty() ? 0 : thresholds[step.value]);
-  };
-  return *std::ranges::max_element(
-      steps, [&](const StepCandidate& a, const StepCandidate& b) { return beyond(a) < beyond(b); });
-}
-
-void add_step(const StepCandidate& step, ScaledFleet* fleet) {
-  const Eigen::VectorXd& direction = fleet->directions[step.value];
-  for (const std::size_t u : step.robots) {
-    RobotRuns& robot = fleet->robots[u];
-    const std::size_t onset = run_from(robot, step.moment);
-    robot.steps.push_back({onset, direction});
-    if (step.length > 0) robot.steps.push_back({onset + step.length, direction});
-  }
-}
-
-std::vector<StepCandidate> best_steps(ScaledFleet* fleet, int rounds, RunVariances* variances) {
-  const StepCandidate first = best_of(steps_in(*fleet, *variances));
-  if (first.statistic > 0) {
-    add_step(first, fleet);
-    estimate_variances(&fleet->robots, variances, rounds);
-    for (const std::size_t u : first.robots) {
-      std::vector<StepColumn>& steps = fleet->robots[u].steps;
-      steps.resize(steps.size() - (first.length > 0 ? 2 : 1));
-    }
-  }
-  return steps_in(*fleet, *variances);
-}
-
-std::vector<StepCandidate> add_steps_beyond(const std::vector<double>& thresholds,
-                                            ScaledFleet* fleet, RunVariances* variances) {
-  std::vector<StepCandidate> found;
-  while (found.size() < kMostSteps) {
-    const StepCandidate step = best_of(best_steps(fleet, kEstimateRounds, variances), thresholds);
-    if (step.statistic <= thresholds[step.value]) break;
-    add_step(step, fleet);
-    found.push_back(step);
-  }
-  return found;
-}
-
-namespace {
-
 using Eigen::VectorXd;
 
 // The smallest span of runs that holds these shares' 90 % best.
@@ -260,6 +183,79 @@ void describe_step(const WatchedRows& rows, const ScaledFleet& fleet, const RunV
 }
 
 }  // namespace
+
+std::size_t run_from(const RobotRuns& robot, std::size_t moment) {
+  return static_cast<std::size_t>(std::ranges::lower_bound(robot.moments, moment) -
+                                  robot.moments.begin());
+}
+
+PooledScores pool_scores(const ScaledFleet& fleet, const std::vector<std::size_t>& robots,
+                         const std::vector<std::vector<std::vector<StepScore>>>& of_robots) {
+  PooledScores pooled;
+  for (const std::size_t u : robots) append(pooled.moments, fleet.robots[u].moments);
+  std::ranges::sort(pooled.moments);
+  pooled.moments.erase(std::unique(pooled.moments.begin(), pooled.moments.end()),
+                       pooled.moments.end());
+  pooled.scores.assign(fleet.directions.size(), std::vector<StepScore>(pooled.moments.size()));
+  for (const std::size_t u : robots) {
+    for (std::size_t m = 0; m < pooled.moments.size(); ++m) {
+      const std::size_t run = run_from(fleet.robots[u], pooled.moments[m]);
+      for (std::size_t k = 0; k < pooled.scores.size(); ++k) {
+        if (run >= of_robots[u][k].size()) continue;
+        const StepScore& own = of_robots[u][k][run];
+        StepScore& sum = pooled.scores[k][m];
+        sum.precision += own.precision;
+        if (own.precision > 0)
+          sum.change += (own.change - sum.change) * own.precision / sum.precision;
+      }
+    }
+  }
+  return pooled;
+}
+
+StepCandidate best_of(const std::vector<StepCandidate>& steps,
+                      const std::vector<double>& thresholds) {
+  const auto beyond = [&](const StepCandidate& step) {
+    return step.statistic - (thresholds.empty() ? 0 : thresholds[step.value]);
+  };
+  return *std::ranges::max_element(
+      steps, [&](const StepCandidate& a, const StepCandidate& b) { return beyond(a) < beyond(b); });
+}
+
+void add_step(const StepCandidate& step, ScaledFleet* fleet) {
+  const Eigen::VectorXd& direction = fleet->directions[step.value];
+  for (const std::size_t u : step.robots) {
+    RobotRuns& robot = fleet->robots[u];
+    const std::size_t onset = run_from(robot, step.moment);
+    robot.steps.push_back({onset, direction});
+    if (step.length > 0) robot.steps.push_back({onset + step.length, direction});
+  }
+}
+
+std::vector<StepCandidate> best_steps(ScaledFleet* fleet, int rounds, RunVariances* variances) {
+  const StepCandidate first = best_of(steps_in(*fleet, *variances));
+  if (first.statistic > 0) {
+    add_step(first, fleet);
+    estimate_variances(&fleet->robots, variances, rounds);
+    for (const std::size_t u : first.robots) {
+      std::vector<StepColumn>& steps = fleet->robots[u].steps;
+      steps.resize(steps.size() - (first.length > 0 ? 2 : 1));
+    }
+  }
+  return steps_in(*fleet, *variances);
+}
+
+std::vector<StepCandidate> add_steps_beyond(const std::vector<double>& thresholds,
+                                            ScaledFleet* fleet, RunVariances* variances) {
+  std::vector<StepCandidate> found;
+  while (found.size() < kMostSteps) {
+    const StepCandidate step = best_of(best_steps(fleet, kEstimateRounds, variances), thresholds);
+    if (step.statistic <= thresholds[step.value]) break;
+    add_step(step, fleet);
+    found.push_back(step);
+  }
+  return found;
+}
 
 VectorXd tolerances_of(const WatchedRows& rows) {
   return vector_of(rows.rows, &KinematicRow::tolerance);

@@ -103,44 +103,6 @@ LineChart value_chart(const WatchedFleet& fleet, const FleetChanges& changes, st
   return chart;
 }
 
-}  // namespace
-
-std::string skip_text(const WatchedSkip& skip) {
-  return skip.robot + (skip.run.empty() ? "" : "/" + skip.run) + ": omitted: " + skip.why;
-}
-
-std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& changes) {
-  const auto most = std::ranges::max_element(changes.steps, {}, &ValueStep::statistic);
-  if (most != changes.steps.end()) return run_name(fleet, most->robots.front(), most->onset);
-  if (!changes.odd_robots.empty()) return run_name(fleet, changes.odd_robots.front().robot, 0);
-  if (changes.odd_runs.empty()) return "";
-  return run_name(fleet, changes.odd_runs.front().robot, changes.odd_runs.front().run);
-}
-
-std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes) {
-  const auto runs =
-      sum_of(fleet.robots, [](const WatchedRobot& robot) { return robot.runs.size(); });
-  std::string text = fmt::format("{} robots, {} runs, {} of them fitted now\n", fleet.robots.size(),
-                                 runs, fleet.fitted);
-  std::vector<Line> lines = finding_lines(fleet, changes);
-  if (!lines.empty()) lines.insert(lines.begin(), kHead);
-  std::vector<std::size_t> widths(kHead.size());
-  for (const Line& line : lines) {
-    for (std::size_t c = 0; c < line.size(); ++c) widths[c] = std::max(widths[c], line[c].size());
-  }
-  for (const Line& line : lines) {
-    std::string row;
-    for (std::size_t c = 0; c < line.size(); ++c)
-      row += fmt::format("{:<{}}  ", line[c], widths[c]);
-    text += row.substr(0, row.find_last_not_of(' ') + 1) + "\n";
-  }
-  for (const OddRun& odd : changes.odd_runs) text += odd_run_text(fleet, odd) + "\n";
-  for (const WatchedSkip& skip : fleet.skipped) text += skip_text(skip) + "\n";
-  return text + verdict(fleet, changes) + "\n";
-}
-
-namespace {
-
 constexpr auto kChange = [](auto& v, auto& row) { FIELDS(change, lo, hi, statistic); };
 
 Json value_json(const WatchedFleet& fleet, std::size_t robot, std::size_t value) {
@@ -212,6 +174,40 @@ Json robots_json(const WatchedFleet& fleet, const FleetChanges& changes) {
 }
 
 }  // namespace
+
+std::string skip_text(const WatchedSkip& skip) {
+  return skip.robot + (skip.run.empty() ? "" : "/" + skip.run) + ": omitted: " + skip.why;
+}
+
+std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& changes) {
+  const auto most = std::ranges::max_element(changes.steps, {}, &ValueStep::statistic);
+  if (most != changes.steps.end()) return run_name(fleet, most->robots.front(), most->onset);
+  if (!changes.odd_robots.empty()) return run_name(fleet, changes.odd_robots.front().robot, 0);
+  if (changes.odd_runs.empty()) return "";
+  return run_name(fleet, changes.odd_runs.front().robot, changes.odd_runs.front().run);
+}
+
+std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes) {
+  const auto runs =
+      sum_of(fleet.robots, [](const WatchedRobot& robot) { return robot.runs.size(); });
+  std::string text = fmt::format("{} robots, {} runs, {} of them fitted now\n", fleet.robots.size(),
+                                 runs, fleet.fitted);
+  std::vector<Line> lines = finding_lines(fleet, changes);
+  if (!lines.empty()) lines.insert(lines.begin(), kHead);
+  std::vector<std::size_t> widths(kHead.size());
+  for (const Line& line : lines) {
+    for (std::size_t c = 0; c < line.size(); ++c) widths[c] = std::max(widths[c], line[c].size());
+  }
+  for (const Line& line : lines) {
+    std::string row;
+    for (std::size_t c = 0; c < line.size(); ++c)
+      row += fmt::format("{:<{}}  ", line[c], widths[c]);
+    text += row.substr(0, row.find_last_not_of(' ') + 1) + "\n";
+  }
+  for (const OddRun& odd : changes.odd_runs) text += odd_run_text(fleet, odd) + "\n";
+  for (const WatchedSkip& skip : fleet.skipped) text += skip_text(skip) + "\n";
+  return text + verdict(fleet, changes) + "\n";
+}
 
 Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
   Json odd_robots = Json::array(), odd_runs = Json::array();
