@@ -18,32 +18,13 @@
 namespace gapfarm {
 namespace {
 
-// What a run begins with, read before any farm is there.
-struct RunInputs {
-  std::optional<Checkpoint> checkpoint;
-  StagePlan plan;
-  std::optional<Problem> held_out;
-};
-
-Result<RunInputs> read_inputs(const RunStore& store, const Config& config) {
-  ASSIGN_OR_RETURN(auto checkpoint, store.checkpoint());
-  ASSIGN_OR_RETURN(auto plan, read_stages(config));
-  ASSIGN_OR_RETURN(auto held_out, read_validation(plan, config));
-  return RunInputs{std::move(checkpoint), std::move(plan), std::move(held_out)};
-}
-
 // Where the search of a ground robot's values begins; nothing where the config has the say, and
 // where there is no beginning.
-Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const RunRequest& run,
-                                               Farm& farm, RunWatcher& watcher) {
+Status find_start(const RunRequest& run, Farm& farm, RunWatcher& watcher, OptimiserSetup* setup) {
   const EvolutionSettings& settings = run.config.evolution;
-  const bool own =
-      !settings.seed_nominal || !inputs.plan.stages.empty() || !settings.start.genomes.empty();
-  if (inputs.checkpoint || own || !run.problem.ground || run.problem.log.trials.empty()) {
-    return std::optional<SimulatedStart>();
-  }
-  ASSIGN_OR_RETURN(auto start,
-                   fit_by_simulation(farm, run.problem, run.config.evolution.optimiser.sigma));
+  if (!settings.seed_nominal || !settings.start.genomes.empty()) return {};
+  if (!run.problem.ground || run.problem.log.trials.empty()) return {};
+  ASSIGN_OR_RETURN(auto start, fit_by_simulation(farm, run.problem, settings.optimiser.sigma));
   watcher.note(
       fmt::format("begins at least squares through the simulation: {} simulations from {} start{}, "
                   "{:.2f} nats a window more than with the values of the robot's own kinematics",
@@ -53,132 +34,30 @@ Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const Ru
       "kinematics{}",
       std::abs(start.held_out_gain), start.held_out_gain < 0 ? "less" : "more",
       start.kinematic ? ", too little to leave the kinematics' values" : ""));
-  return std::optional(std::move(start));
-}
-
-Result<std::unique_ptr<Optimiser>> optimiser_of(const RunInputs& inputs, const RunRequest& run,
-                                                Farm& farm, RunWatcher& watcher) {
-  ASSIGN_OR_RETURN(const auto start, start_of(inputs, run, farm, watcher));
-  OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
-  if (start) {
-    setup.nominal = start->genome;
-    setup.spread = start->spread;
-  }
-  const std::vector<Stage>& stages = inputs.plan.stages;
-  ASSIGN_OR_RETURN(auto made, stages.empty() ? make_optimiser(setup) : make_staged(setup, stages));
-  if (inputs.checkpoint) RETURN_IF_ERROR(made->restore(inputs.checkpoint->optimiser_state));
-  return made;
-}
-
-// What a run without a best to leave has to say.
-std::string without_best(const EvolveSummary& evolved) {
-  if (!evolved.best || evolved.best->standing.outcome == v1::OK) return {};
-  if (evolved.best->standing.outcome != v1::INFEASIBLE) return "; no evaluation ended well";
-  return fmt::format("; nothing feasible was found, violations sum to {:.6g} at least",
-                     evolved.best->standing.cost);
-}
-
-Status write_end(RunStore& store, Progress progress, RunState state, const std::string& reason) {
-  progress.state = state;
-  progress.stop_reason = reason;
-  progress.rate_per_s = 0;
-  progress.time_left_s.reset();
-  return store.set_progress(progress);
-}
-
-// How the run's results do on what was held out.
-Result<std::vector<ScoreRow>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
-                                           const Genome& best) {
-  ASSIGN_OR_RETURN(const auto checkpoint, store.checkpoint());
-  std::vector<Genome> stages;
-  if (checkpoint) stages = stage_results(checkpoint->optimiser_state, apart.genes.size());
-  return validate(farm, apart, stages, best);
-}
-
-// What a finished run is for: its model, held against trials held out and against no simulation.
-Status leave_model(RunStore& store, const RunRequest& run, const RunInputs& inputs, Farm& farm,
-                   RunWatcher& watcher, RunSummary& summary) {
-  const Genome& best = summary.evolved.best->genome;
-  if (inputs.held_out) {
-    watcher.read(inputs.held_out->log);
-    ASSIGN_OR_RETURN(auto validated, validated_by(store, *inputs.held_out, farm, best));
-    summary.held_out = inputs.held_out->log.trials.size();
-    summary.validated = std::move(validated);
-  }
-  RETURN_IF_ERROR(write_outputs(store, run.problem, run.config, summary.evolved, farm,
-                                summary.validated, watcher));
-  ASSIGN_OR_RETURN(const auto beside, baseline_note_of_run(run.problem, best, farm));
-  if (!beside.empty()) watcher.note(beside);
-  for (const std::string& name : output_files(run.problem))
-    summary.files.push_back((store.run() / name).string());
+  setup->nominal = std::move(start.genome);
+  setup->spread = std::move(start.spread);
   return {};
 }
 
 }  // namespace
 
-Error stopped_by(RunStore& store, Error error, const Progress& last) {
-  // Where even that cannot be written, status finds the master gone, and the error is reported.
-  static_cast<void>(write_end(store, last, RunState::kStopped, error.message));
-  return error;
-}
-
-Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWatcher& watcher) {
-  const auto inputs = read_inputs(store, request.config);
-  if (!inputs) return stopped_by(store, inputs.error());
-  const EvolveClock clock = monotonic_seconds;
-  const double began_s = clock();
-  FarmEventKeeper events(store, watcher);
-  auto farm = request.open_farm([&](const FarmEvent& event) { events.keep(event); });
-  if (!farm) return stopped_by(store, farm.error());
-  auto optimiser = optimiser_of(*inputs, request, **farm, watcher);
-  if (!optimiser) {
-    events.flush();
-    Progress last;
-    last.farm = (*farm)->tally();
-    return stopped_by(store, optimiser.error(), last);
-  }
-  std::string reason = (*optimiser)->reason();
-  const OptimiserKind kind = request.config.evolution.optimiser.kind;
+Result<std::unique_ptr<Optimiser>> optimiser_of(const RunRequest& run, const StagePlan& plan,
+                                                const std::optional<Checkpoint>& checkpoint,
+                                                Farm& farm, RunWatcher& watcher) {
+  OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
+  const std::vector<Stage>& stages = plan.stages;
+  if (!checkpoint && stages.empty()) RETURN_IF_ERROR(find_start(run, farm, watcher, &setup));
+  ASSIGN_OR_RETURN(auto made, stages.empty() ? make_optimiser(setup) : make_staged(setup, stages));
+  if (checkpoint) RETURN_IF_ERROR(made->restore(checkpoint->optimiser_state));
+  std::string reason = made->reason();
+  const OptimiserKind kind = run.config.evolution.optimiser.kind;
   if (reason.empty() && kind == OptimiserKind::kGenetic) {
-    reason = default_optimiser(request.config.text).value_or(DefaultOptimiser{}).reason;
+    reason = default_optimiser(run.config.text).value_or(DefaultOptimiser{}).reason;
   }
-  for (const std::string& note : {reason, unread_by_search(request.config.text, kind)}) {
+  for (const std::string& note : {reason, unread_by_search(run.config.text, kind)}) {
     if (!note.empty()) watcher.note(note);
   }
-
-  const double of_others_s = inputs->checkpoint ? inputs->checkpoint->wall_s : 0;
-  FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint,
-                              of_others_s + clock() - began_s, clock, watcher);
-  progress.watch(&request.log, &events);
-  const ScoreCandidates score = farm_scores(**farm, request.problem, request.config.seed, progress);
-  StoreSink sink(store, request.problem, **farm, progress);
-  EvolveOptions options;
-  options.settings = request.config.evolution;
-  options.fitness = request.problem.fitness.kind;
-  options.spent_s = of_others_s;
-  options.began_s = began_s;
-  auto evolved = evolve(
-      **optimiser, score, [&](const GenerationRecord& record) { return sink.commit(record); },
-      clock, options, request.stop_requested);
-  watcher.progress("", false);
-  events.flush();
-  if (!evolved) return stopped_by(store, evolved.error(), progress.now());
-  RunSummary summary;
-  summary.evolved = *std::move(evolved);
-  summary.failure = progress.failure();
-  summary.evolved.text += without_best(summary.evolved);
-  const RunState state = summary.stopped() ? RunState::kStopped : RunState::kFinished;
-  RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));
-  if (summary.stopped()) return summary;
-  if (summary.evolved.best && summary.evolved.best->standing.outcome == v1::OK) {
-    const Status left = leave_model(store, request, *inputs, **farm, watcher, summary);
-    // Finished is what has its model; resumed, it only leaves that behind.
-    if (!left) return stopped_by(store, left.error(), progress.now());
-  }
-  // Of earlier masters' generations too, and of what was done after the last one.
-  ASSIGN_OR_RETURN(const auto given_up, store.quarantined());
-  summary.given_up = given_up + (*farm)->given_up() - sink.quarantined();
-  return summary;
+  return made;
 }
 
 Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Config& config) {
@@ -234,13 +113,14 @@ Status check_runnable(const Config& config) {
   return log ? Status() : Status(log.error());
 }
 
-Result<std::vector<ScoreRow>> validate(Farm& farm, const Problem& apart,
-                                       const std::vector<Genome>& stages, const Genome& best) {
+Result<std::vector<ScoreRow>> validate(const RunStore& store, const Problem& apart, Farm& farm,
+                                       const Genome& best) {
+  ASSIGN_OR_RETURN(const auto checkpoint, store.checkpoint());
   std::vector<ScoreRow> rows = {{"the config's own values", {}}};
   std::vector<Genome> genomes = {{}};
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    rows.push_back({"after stage " + std::to_string(i + 1), {}});
-    genomes.push_back(stages[i]);
+  if (checkpoint) append(genomes, stage_results(checkpoint->optimiser_state, apart.genes.size()));
+  for (std::size_t i = 1; i < genomes.size(); ++i) {
+    rows.push_back({"after stage " + std::to_string(i), {}});
   }
   rows.push_back({"the best", {}});
   genomes.push_back(best);

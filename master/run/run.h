@@ -17,9 +17,8 @@
 #include "common/score/baselines.h"
 #include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
-#include "master/farm/farm.h"
+#include "master/farm/scheduler.h"
 #include "master/report/run/run_report.h"
-#include "master/run/evolution_farm.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
@@ -33,8 +32,21 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
 Status check_runnable(const Config& config);
 
 // Fitness on what was held out of the problem's own values, each stage's result and the best.
-Result<std::vector<ScoreRow>> validate(Farm& farm, const Problem& apart,
-                                       const std::vector<Genome>& stages, const Genome& best);
+Result<std::vector<ScoreRow>> validate(const RunStore& store, const Problem& apart, Farm& farm,
+                                       const Genome& best);
+
+// What those who watch a run hear while it goes on.
+class RunWatcher {
+ public:
+  virtual ~RunWatcher() = default;
+  virtual void note(std::string_view) {}
+  // The run goes on all the same.
+  virtual void error(const Error&) {}
+  // In place of the last one; `news`: it is not just more of the same.  Empty: there is none now.
+  virtual void progress(std::string_view, bool /*news*/) {}
+  // A log that the run takes beside its own.
+  virtual void read(const TrialLog&) {}
+};
 
 struct RunRequest {
   const Config& config;  // overrides applied; its log may be empty
@@ -45,6 +57,12 @@ struct RunRequest {
       open_farm;
   std::function<bool()> stop_requested;  // may be empty; the farm is notified separately
 };
+
+// What searches for the run, begun or as the checkpoint has it, with notes on how and why.  Errors:
+// of its setup, the farm's.
+Result<std::unique_ptr<Optimiser>> optimiser_of(const RunRequest& run, const StagePlan& plan,
+                                                const std::optional<Checkpoint>& checkpoint,
+                                                Farm& farm, RunWatcher& watcher);
 
 struct RunSummary {
   EvolveSummary evolved;

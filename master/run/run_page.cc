@@ -145,12 +145,12 @@ Result<std::optional<RunOutcome>> stored_outcome(const RunReader& reader, std::u
   return std::optional<RunOutcome>(std::move(outcome));
 }
 
-Model model_of(const RunStore& store, const Problem& problem, const Config& config,
-               const EvolveSummary& summary) {
+Model model_of(const RunStore& store, const RunRequest& run, const EvolveSummary& summary) {
+  const Problem& problem = run.problem;
   Model model = model_of_problem(problem, problem.values_of(summary.best->genome));
   model.score = fitness_of_cost(problem.fitness.kind, summary.best->standing.cost);
-  model.data = {store.info().problem_hash, problem.log.trials.size(), config.trial_files};
-  model.origin = {store.run().string(), config.seed, summary.generations, summary.evaluations};
+  model.data = {store.info().problem_hash, problem.log.trials.size(), run.config.trial_files};
+  model.origin = {store.run().string(), run.config.seed, summary.generations, summary.evaluations};
   return model;
 }
 
@@ -164,12 +164,12 @@ std::vector<ScoreRow> baseline_rows(const std::vector<BaselineComparison>& compa
   return rows;
 }
 
-Status write_poses(RunStore& store, const Problem& problem, const EvolveSummary& summary,
-                   Farm& farm, const std::vector<ScoreRow>& validated) {
+Status write_poses(RunStore& store, const Problem& problem, const Genome& best, Farm& farm,
+                   const std::vector<ScoreRow>& validated) {
   // As the config had them, and as evolved.
-  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)),
-                                                {prediction_task(Genome(), false),
-                                                 prediction_task(summary.best->genome, false)}));
+  ASSIGN_OR_RETURN(const auto results,
+                   farm.run(farm.add_problem(to_proto(problem)),
+                            {prediction_task(Genome(), false), prediction_task(best, false)}));
   std::vector<PredictionOfLog> predictions;
   const char* const labels[] = {"before", "after"};
   const PredictionOfLog* known[] = {nullptr, nullptr};
@@ -333,15 +333,25 @@ std::vector<std::string> output_files(const Problem& problem) {
   return {"model.toml", "report.html", "poses.svg", "fitness.svg"};
 }
 
-Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
-                     const EvolveSummary& summary, Farm& farm,
-                     const std::vector<ScoreRow>& validated, RunWatcher& watcher) {
-  const Model model = model_of(store, problem, config, summary);
-  RETURN_IF_ERROR(replace_model(store, model, watcher));
-  if (!is_value(problem.fitness.kind)) {
-    RETURN_IF_ERROR(write_poses(store, problem, summary, farm, validated));
+Status write_outputs(RunStore& store, const RunRequest& run, const std::optional<Problem>& held_out,
+                     Farm& farm, RunWatcher& watcher, RunSummary* summary) {
+  const Problem& problem = run.problem;
+  const Genome& best = summary->evolved.best->genome;
+  if (held_out) {
+    watcher.read(held_out->log);
+    ASSIGN_OR_RETURN(summary->validated, validate(store, *held_out, farm, best));
+    summary->held_out = held_out->log.trials.size();
   }
-  return write_pages(store, watcher);
+  RETURN_IF_ERROR(replace_model(store, model_of(store, run, summary->evolved), watcher));
+  if (!is_value(problem.fitness.kind)) {
+    RETURN_IF_ERROR(write_poses(store, problem, best, farm, summary->validated));
+  }
+  RETURN_IF_ERROR(write_pages(store, watcher));
+  ASSIGN_OR_RETURN(const auto beside, baseline_note_of_run(problem, best, farm));
+  if (!beside.empty()) watcher.note(beside);
+  summary->files = mapped(output_files(problem),
+                          [&](const std::string& name) { return (store.run() / name).string(); });
+  return {};
 }
 
 }  // namespace gapfarm

@@ -39,10 +39,10 @@ inline constexpr const char* kDeterminedFile = "determined.csv";
 // The names of what write_outputs() writes.
 std::vector<std::string> output_files(const Problem& problem);
 
-// `validated`: what is known of trials held out.  REQUIRES: a best member whose outcome is OK.
-Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
-                     const EvolveSummary& summary, Farm& farm,
-                     const std::vector<ScoreRow>& validated, RunWatcher& watcher);
+// What a finished run is for: its model, held against `held_out` and against no simulation; into
+// `summary` what came of it.  REQUIRES: a best member whose outcome is OK.
+Status write_outputs(RunStore& store, const RunRequest& run, const std::optional<Problem>& held_out,
+                     Farm& farm, RunWatcher& watcher, RunSummary* summary);
 
 // What a run's store shows of how it went on, for its page.
 

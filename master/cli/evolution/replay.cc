@@ -15,7 +15,7 @@
 #include "master/evolve/evolve.h"
 #include "master/evolve/individual.h"
 #include "master/farm/planned_trials.h"
-#include "master/run/evolution_farm.h"
+#include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -92,43 +92,32 @@ Result<std::optional<std::uint64_t>> earlier_twin(const RunReader& reader, const
   return twin;
 }
 
-class Replay {
- public:
-  Replay(SocketFarm& farm, const Problem& problem, std::uint64_t seed)
-      : farm_(farm), problem_(problem), seed_(seed), hash_(farm.add_problem(to_proto(problem))) {}
-
-  // All scores of `individual`, on the random streams of `birth_id`.
-  Result<Standing> standing(const StoredIndividual& individual, std::uint64_t birth_id) {
-    const auto tasks = mapped(indices(std::max(1u, individual.scores)), [&](std::size_t k) {
-      return evaluation_task({birth_id, static_cast<unsigned>(k), individual.genome}, seed_);
-    });
-    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
-    Standing standing;
-    for (const v1::TaskResult& result : results) {
-      ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness));
-      standing.add(score);
-    }
-    return standing;
+// All scores of `individual`, on the random streams of `birth_id`.
+Result<Standing> standing_of(Farm& farm, const Problem& problem, std::uint64_t seed,
+                             const StoredIndividual& individual, std::uint64_t birth_id) {
+  const auto tasks = mapped(indices(std::max(1u, individual.scores)), [&](std::size_t k) {
+    return evaluation_task({birth_id, static_cast<unsigned>(k), individual.genome}, seed);
+  });
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
+  Standing standing;
+  for (const v1::TaskResult& result : results) {
+    ASSIGN_OR_RETURN(const Score score, score_of(result, problem.fitness));
+    standing.add(score);
   }
+  return standing;
+}
 
-  // Drives the whole log with this individual, pose by pose.
-  Result<TrialLog> drive(const StoredIndividual& individual, double interval_s) {
-    std::vector<v1::Task> tasks =
-        simulate_tasks(plan_of(problem_, problem_.log), {}, seed_, interval_s);
-    for (v1::Task& task : tasks) {
-      task.mutable_simulate()->mutable_point()->mutable_genome()->Assign(individual.genome.begin(),
-                                                                         individual.genome.end());
-    }
-    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
-    return simulated_log(results, "the drive");
+// Drives the whole log with this individual, pose by pose.
+Result<TrialLog> drive(Farm& farm, const Problem& problem, std::uint64_t seed, const Genome& genome,
+                       double interval_s) {
+  auto tasks = simulate_tasks(plan_of(problem, problem.log), {}, seed, interval_s);
+  for (v1::Task& task : tasks) {
+    task.mutable_simulate()->mutable_point()->mutable_genome()->Assign(genome.begin(),
+                                                                       genome.end());
   }
-
- private:
-  SocketFarm& farm_;
-  const Problem& problem_;
-  std::uint64_t seed_;
-  std::string hash_;
-};
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
+  return simulated_log(results, "the drive");
+}
 
 std::string in_full(const std::string& outcome, const std::optional<double>& fitness) {
   return fitness ? format_number(fitness, 17) : outcome;
@@ -179,21 +168,22 @@ Result<int> run_replay(ReplayOptions& options, CliContext& context) {
   RETURN_IF_ERROR(options.outputs.plan(options.out));
 
   ASSIGN_OR_RETURN(auto farm, start_farm({.workers = 1}, {}, context));
-  Replay replay(*farm, problem, info.seed);
-  Result<Standing> again = replay.standing(found.individual, found.individual.birth_id);
-  if (!again) return again.error();
+  const auto scored_as = [&](std::uint64_t birth_id) {
+    return standing_of(*farm, problem, info.seed, found.individual, birth_id);
+  };
+  ASSIGN_OR_RETURN(Standing again, scored_as(found.individual.birth_id));
   if (const auto twin = earlier_twin(reader, found); twin && *twin) {
     context.console.note("scored as its twin, genome " + std::to_string(**twin));
-    again = replay.standing(found.individual, **twin);
-    if (!again) return again.error();
+    ASSIGN_OR_RETURN(again, scored_as(**twin));
   }
-  Comparison comparison = compare(found, *again, problem);
+  Comparison comparison = compare(found, again, problem);
   if (!comparison.same && farm->numeric_class() != info.numeric_class) {
     context.console.note("this machine computes other last bits: numeric class " +
                          farm->numeric_class() + ", the run's " + info.numeric_class);
   }
   if (!options.paths.empty()) {
-    ASSIGN_OR_RETURN(const TrialLog log, replay.drive(found.individual, options.interval_s));
+    ASSIGN_OR_RETURN(const TrialLog log,
+                     drive(*farm, problem, info.seed, found.individual.genome, options.interval_s));
     // Without a mark: they were not measured, so no log may read them by itself.
     RETURN_IF_ERROR(options.outputs.write(options.paths, format_paths(log)));
     comparison.text +=
