@@ -218,11 +218,6 @@ std::string standing(const Summary& summary) {
   return "fine";
 }
 
-std::string robot_name(const Problem& problem) {
-  const std::string& name = problem.tracked->name();
-  return name.empty() ? "the file of [robot]" : name;
-}
-
 // What is searched, how, and what that costs.
 std::string search_text(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
@@ -283,7 +278,10 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
     text += drive_names()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
   } else {
     text += problem.table()[0].key + " " + problem.table().format(0, problem.values[0]);
-    if (problem.tracked) text += ", sizes of " + robot_name(problem);
+    if (problem.tracked) {
+      const std::string& name = problem.tracked->name();
+      text += ", sizes of " + (name.empty() ? "the file of [robot]" : name);
+    }
     text += "\n";
   }
   text += "trials       " + std::to_string(summary.trials) + " in " +

@@ -7,13 +7,16 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/json/matrix.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
-#include "master/cli/data/export_source.h"
-#include "master/cli/subcommand.h"
+#include "master/cli/data/export_command.h"
+#include "master/diagnose/result/diagnosis_json.h"
 #include "master/ground/reference.h"
 #include "master/ground/report/ranges.h"
+#include "master/ground/report/ros_export.h"
+#include "master/ground/report/simulator_model.h"
 #include "master/io/log_checks/log_checks.h"
 #include "master/io/robot_files/controllers.h"
 #include "master/io/robot_files/understand.h"
@@ -22,6 +25,7 @@
 namespace gapfarm {
 namespace {
 
+constexpr int kMostSamplesOut = 9999;
 constexpr double kLeastShift_s = 1e-3;
 constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two poses is longer than
 
@@ -53,8 +57,14 @@ Status check_ground(const Problem& problem, const std::string& source) {
       "of any diagnosis, too: gapfarm diagnose CONFIG --out DIAGNOSIS"};
 }
 
-}  // namespace
+// A ground robot and the log that it is fitted to.
+struct GroundSource {
+  GroundRobot robot;
+  std::vector<std::string> logs;  // folders
+  RosFriction friction;           // as simulated, of a run that searched for it
+};
 
+// Every value of the robot's kinematics by its log.
 Result<GroundReference> fit_source(const GroundSource& source, Console& console) {
   const GroundRobot& robot = source.robot;
   ASSIGN_OR_RETURN(const auto logged, read_run_folders(source.logs, robot.channels));
@@ -79,6 +89,7 @@ Result<GroundReference> fit_source(const GroundSource& source, Console& console)
   return *std::move(asked.reference);
 }
 
+// By values.json of a ground robot's diagnosis, where there is one.
 Result<std::optional<ReportedValues>> values_in(const std::string& folder) {
   const auto path = std::filesystem::path(folder) / "values.json";
   if (!is_there(path)) return std::optional<ReportedValues>();
@@ -86,6 +97,7 @@ Result<std::optional<ReportedValues>> values_in(const std::string& folder) {
   return std::optional(std::move(values));
 }
 
+// Of a config or a run.
 Result<GroundSource> read_ground_source(const std::string& source, Console& console) {
   std::error_code ignored;
   if (std::filesystem::is_regular_file(source, ignored)) {
@@ -107,8 +119,6 @@ Result<GroundSource> read_ground_source(const std::string& source, Console& cons
   return GroundSource{problem.ground->robot(), config.trial_files,
                       simulated_friction(problem, model)};
 }
-
-namespace {
 
 constexpr double kSame = 1e-4;  // of a size, as files round it
 
@@ -217,6 +227,82 @@ Result<int> export_ros(ExportCommand& command, CliContext& context) {
   console.result(text, export_json(data));
   console.note("wrote: " + command.out + "/controllers.yaml" +
                (gazebo.empty() ? "" : ", gazebo.xml"));
+  return kExitDone;
+}
+
+Result<Ranges> ranges_of_trials(const std::string& path) {
+  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
+  ASSIGN_OR_RETURN(const auto diagnosis, under(path, parse_diagnosis(text)));
+  return under(path, ranges_of(diagnosis));
+}
+
+Result<Ranges> read_ranges(const std::string& source, Console& console) {
+  ASSIGN_OR_RETURN(const auto values, values_in(source));
+  const auto diagnosis = std::filesystem::path(source) / "diagnosis.json";
+  if (!values && is_there(diagnosis)) {
+    return ranges_of_trials(diagnosis.string());
+  }
+  GroundSource ground;
+  if (values) {
+    ground.robot = values->given;
+    ground.logs = mapped(values->logs, [&](auto& log) { return path_from(values->folder, log); });
+  } else {
+    ASSIGN_OR_RETURN(ground, read_ground_source(source, console));
+  }
+  ASSIGN_OR_RETURN(const auto fit, fit_source(ground, console));
+  if (ground.friction.along) ground.robot.friction = *ground.friction.along;
+  Ranges ranges = ranges_of(ground.robot, fit);
+  ranges.logs = ground.logs;
+  return ranges;
+}
+
+std::string model_name(int sample) {
+  return sample == 0 ? "robot.xml" : fmt::format("robot_{:04}.xml", sample);
+}
+
+// `sample`: 0 for the means.
+std::string model_of(const Ranges& ranges, const Eigen::VectorXd& values, int sample) {
+  return mujoco_model(robot_at(ranges, values), *ranges.robot,
+                      sample == 0 ? "Means of ranges.toml, from " + ranges.source + "."
+                                  : fmt::format("Draw {} of samples.csv.", sample));
+}
+
+// What a simulation is to be randomised by.
+Result<int> export_ranges(ExportCommand& command, CliContext& context) {
+  std::vector<std::string> names = {"ranges.toml", "ranges.yaml", "samples.csv", "robot.sdf",
+                                    "scene.xml"};
+  for (int k = 0; k <= command.samples; ++k) names.push_back(model_name(k));
+  if (command.samples > 0 && command.out.empty() && !context.console.json()) {
+    return Error{"--samples: name a folder to write them to with --out"};
+  }
+  if (!command.out.empty()) RETURN_IF_ERROR(command.outputs.plan_in(command.out, names));
+  ASSIGN_OR_RETURN(auto ranges, read_ranges(command.source, context.console));
+  ranges.source = command.source;
+  const Eigen::MatrixXd draws = draw_values(ranges, command.samples, command.seed);
+  nlohmann::ordered_json json = ranges_json(ranges);
+  const std::string toml = ranges_toml(json), yaml = ranges_yaml(json);
+  if (command.samples > 0) json["samples"] = Eigen::MatrixXd(draws.transpose());
+  if (command.out.empty()) {
+    context.console.result(ranges_table(ranges) + "\n" + toml, json);
+    return kExitDone;
+  }
+  Outputs::NamedTexts files = {{"ranges.toml", toml}, {"ranges.yaml", yaml}};
+  if (command.samples > 0) files.emplace_back("samples.csv", samples_csv(ranges, draws));
+  if (ranges.robot && has_simulator_model(*ranges.robot)) {
+    const Eigen::VectorXd means = means_of(ranges);
+    files.emplace_back("robot.sdf", sdf_model(robot_at(ranges, means), *ranges.robot,
+                                              "Means of ranges.toml, from " + ranges.source + "."));
+    files.emplace_back("scene.xml", mujoco_scene());
+    files.emplace_back(model_name(0), model_of(ranges, means, 0));
+    for (int k = 1; k <= command.samples; ++k) {
+      files.emplace_back(model_name(k), model_of(ranges, draws.col(k - 1), k));
+    }
+  }
+  context.begun = true;
+  RETURN_IF_ERROR(command.outputs.write_in(command.out, files));
+  context.console.result(ranges_table(ranges), json);
+  context.console.note(fmt::format("wrote {} files to {}: {} ... {}", files.size(), command.out,
+                                   files.front().first, files.back().first));
   return kExitDone;
 }
 

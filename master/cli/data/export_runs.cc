@@ -8,7 +8,7 @@
 
 #include "common/json/json.h"
 #include "common/problem/problem.h"
-#include "master/cli/data/export_source.h"
+#include "master/cli/data/export_command.h"
 #include "master/ground/paths.h"
 #include "master/io/logs/bags.h"
 
@@ -116,22 +116,18 @@ std::string pose_message(const Pose& X, std::uint64_t ns) {
 }
 
 // Times of MCAP are not below 0: those of logs that begin there are moved.
-struct LogClock {
-  double first_s = 0;
-
-  std::uint64_t ns(double t_s) const {
-    return static_cast<std::uint64_t>(std::llround((t_s - std::min(0.0, first_s)) * 1e9));
-  }
-};
+std::uint64_t ns_of(double t_s, double first_s) {
+  return static_cast<std::uint64_t>(std::llround((t_s - std::min(0.0, first_s)) * 1e9));
+}
 
 void add_rows(const std::string& topic, const std::vector<CommandRow>& rows,
-              const std::vector<std::string>& names, const LogClock& clock, McapWriter* mcap) {
+              const std::vector<std::string>& names, double first_s, McapWriter* mcap) {
   if (rows.empty() || names.empty()) return;
   Json schema = numbers_schema(names);
   schema["properties"]["timestamp"] = stamp_schema();
   const auto channel = mcap->add_channel(topic, "gapfarm.Numbers", json_text(schema));
   for (const CommandRow& row : rows) {
-    const std::uint64_t ns = clock.ns(row.t_s);
+    const std::uint64_t ns = ns_of(row.t_s, first_s);
     Json message = {{"timestamp", stamp_of(ns)}};
     for (std::size_t c = 0; c < names.size(); ++c) message[names[c]] = row.values[c];
     mcap->add_message(channel, ns, json_text(message));
@@ -141,20 +137,20 @@ void add_rows(const std::string& topic, const std::vector<CommandRow>& rows,
 void add_run(const DrivenPath& path, const RunLog& log, const std::vector<ShownPoses>& shown,
              McapWriter* mcap) {
   const LoggedRun& run = log.runs[path.in_log];
-  LogClock clock{path.t_s.front()};
+  double first_s = path.t_s.front();
   for (const auto* rows : {&run.commands, &run.wheel_speeds}) {
-    if (!rows->empty()) clock.first_s = std::min(clock.first_s, rows->front().t_s);
+    if (!rows->empty()) first_s = std::min(first_s, rows->front().t_s);
   }
   const std::string folder = "/" + path.run + "/";
   for (const ShownPoses& s : shown) {
     const auto channel = mcap->add_channel(folder + s.name, "foxglove.PoseInFrame", pose_schema());
     for (std::size_t k = 0; k < path.t_s.size(); ++k) {
-      const std::uint64_t ns = clock.ns(path.t_s[k]);
+      const std::uint64_t ns = ns_of(path.t_s[k], first_s);
       mcap->add_message(channel, ns, pose_message((path.*s.poses)[k], ns));
     }
   }
-  add_rows(folder + "commands", run.commands, log.channels, clock, mcap);
-  add_rows(folder + "wheels", run.wheel_speeds, log.wheel_channels, clock, mcap);
+  add_rows(folder + "commands", run.commands, log.channels, first_s, mcap);
+  add_rows(folder + "wheels", run.wheel_speeds, log.wheel_channels, first_s, mcap);
 }
 
 }  // namespace

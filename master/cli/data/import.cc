@@ -1,6 +1,5 @@
 // gapfarm import FORMAT FILES: other programs' logs to the trial format.
 
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -32,8 +31,6 @@ struct ImportOptions {
   TrialOptions reading;
 };
 
-namespace fs = std::filesystem;
-
 Result<std::vector<Recording>> read_all(const std::vector<std::string>& files, bool skip_invalid) {
   std::vector<Recording> recordings;
   for (const std::string& file : files) {
@@ -41,11 +38,6 @@ Result<std::vector<Recording>> read_all(const std::vector<std::string>& files, b
     recordings.push_back(std::move(recording));
   }
   return recordings;
-}
-
-Result<LogMap> read_map(const std::string& path, const std::vector<Recording>& recordings) {
-  if (path.empty()) return guess_map(recordings);
-  return parse_file(path, parse_map);
 }
 
 // What there is, for somebody who has to write a map.
@@ -116,7 +108,8 @@ Result<int> import_runs(ImportOptions& options, CliContext& context) {
   if (!options.map.empty()) outputs.reads(options.map);
   ASSIGN_OR_RETURN(const std::vector<Recording> recordings,
                    read_all(options.files, options.reading.read.skip_invalid));
-  ASSIGN_OR_RETURN(LogMap map, read_map(options.map, recordings));
+  ASSIGN_OR_RETURN(
+      LogMap map, options.map.empty() ? guess_map(recordings) : parse_file(options.map, parse_map));
   if (options.map.empty()) drive_by_wheels(map);
   for (const std::string& note : map.notes) console.note(printable(note));
   std::string map_text = format_map(map);

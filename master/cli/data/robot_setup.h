@@ -2,34 +2,10 @@
 // `gapfarm robot --config` writes, and `gapfarm init URDF` as its front.
 #pragma once
 
-#include <string>
-#include <vector>
-
-#include "common/base/result.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
-#include "master/io/robot_files/understand.h"
 
 namespace gapfarm {
-
-struct RobotSetup {
-  std::vector<std::string> files,
-      controllers;                // URDFs and robot.tomls; .yaml of either is a controller's
-  std::string robot;              // robot.toml to write; empty: none
-  std::string config;             // to write; empty: none; "-": text alone
-  std::vector<std::string> runs;  // folders that the config names
-};
-
-struct RobotTexts {
-  RobotReading reading;
-  GroundRobot completed;
-  std::string robot, config;
-};
-
-// Reads the files and makes the texts.
-Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs);
-// Both files, planned before.
-Status write_robot(const RobotSetup& setup, const RobotTexts& texts, const Outputs& outputs);
 
 // `file` as a config at `out` ("-": in the working folder) names it.
 std::string file_seen_from(const std::string& out, const std::string& file);
