@@ -22,17 +22,6 @@ namespace {
 
 constexpr double kAlike = 0.9;  // |cosine| from which two effects count as alike
 
-struct PlanOptions : LongOptions {
-  std::string source;
-  std::string out;
-  std::string picture;
-  std::string place;
-  plan::PlanSettings settings;
-  std::optional<unsigned> sessions, chain;
-  std::vector<double> levels, durations;
-  DriveOptions drive;  // of a ground robot
-};
-
 constexpr const char* kOfTrials = "a plan of single trials";
 constexpr const char* kOfDrive = "a ground robot's drive";
 constexpr OptionOf kPlanOptions[] = {
@@ -142,10 +131,9 @@ Json table_json(const plan::DesignedPlan& plan) {
 
 Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& config,
                                   CliContext& context) {
-  ASSIGN_OR_RETURN(
-      const auto asked,
-      options.begin("plan", options.out, {{"candidates", 10, 0}, {"what they show", 3, 0}},
-                    config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   options.begin("plan", {{"candidates", 10, 0}, {"what they show", 3, 0}},
+                                 config.farm, context));
   return plan::design_plan(*asked, config, options.settings, context.work->hooks());
 }
 
@@ -158,11 +146,9 @@ Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& cont
   options.outputs.reads(options.source);
   options.outputs.reads(source.config);
   if (of_drive) {
-    plan::DriveSettings& drive = options.drive.settings;
-    drive.seed = options.settings.seed;
-    if (!options.place.empty()) RETURN_IF_ERROR(read_place(options.place, &drive));
-    return run_plan_drive(options.drive, {options.source, options.out, options.picture},
-                          source.config, options.outputs, context);
+    options.drive.seed = options.settings.seed;
+    if (!options.place.empty()) RETURN_IF_ERROR(read_place(options.place, &options.drive));
+    return run_plan_drive(options, source.config, context);
   }
   RETURN_IF_ERROR(check_can(source.config.problem.scenario, kSimulates, options.source));
   RETURN_IF_ERROR(apply_options(options, source.config));
@@ -222,7 +208,14 @@ SubcommandRun setup_plan(CLI::App& app) {
   app.add_option("--pool", options->settings.pool, "Chains to choose each one from")
       ->check(CLI::Range(2, 100));
   app.add_option("--seed", options->settings.seed, "Of the chains to choose from");
-  options->drive.declare(app);
+  app.add_option("--seconds", options->drive.seconds, "Of a ground robot's drive, at most")
+      ->check(CLI::Range(2.0, 3600.0))
+      ->capture_default_str();
+  app.add_option("--want", options->wanted,
+                 "Of a ground robot: a value, and how wide its 90 % interval may be: "
+                 "separation=0.5%");
+  app.add_option("--limit", options->limits,
+                 "Of a ground robot's channel: v=0.5 or throttle=0,0.3");
   options->declare(app, LongOptions::Leaves::kFile, false);
   app.footer(
       "Examples:\n"

@@ -166,14 +166,14 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
                                        const std::vector<NamedWidths>& others,
                                        const plan::DriveNoise& noise,
                                        const std::vector<plan::Wanted>& wanted,
-                                       const DriveTask& task) {
+                                       const std::string& out) {
   std::string text =
       fmt::format(
           "noise (of the config; a fitted model knows it better): "
           "{:.2g} m and {:.2g} rad a reading, {:.2g} m and {:.2g} rad after a metre\n",
           noise.position_m, noise.heading_rad, noise.travel, noise.turn) +
       table_text(drive, others);
-  Json json = {{"out", task.out}};
+  Json json = {{"out", out}};
   json["values"] = mapped(drive.rows, [](const KinematicRow& row) -> Json {
     return {{"name", row.name}, {"unit", row.unit}};
   });
@@ -210,7 +210,7 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
   text += fmt::format(
       "{}/commands.csv: {} commands in {} run(s), {:.1f} s; waypoints.csv: where the marker should "
       "be as each ends, from the middle of the floor, heading along x\n",
-      task.out, commands, drive.drive.runs.size(), drive.widths.back().t_s);
+      out, commands, drive.drive.runs.size(), drive.widths.back().t_s);
   return {text, json};
 }
 
@@ -238,18 +238,8 @@ std::string drive_picture(const DrivePlan& drive, const plan::DriveSettings& set
 
 }  // namespace
 
-void DriveOptions::declare(CLI::App& app) {
-  app.add_option("--seconds", settings.seconds, "Of a ground robot's drive, at most")
-      ->check(CLI::Range(2.0, 3600.0))
-      ->capture_default_str();
-  app.add_option("--want", wanted,
-                 "Of a ground robot: a value, and how wide its 90 % interval may be: "
-                 "separation=0.5%");
-  app.add_option("--limit", limits, "Of a ground robot's channel: v=0.5 or throttle=0,0.3");
-}
-
-Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, const Config& config,
-                           Outputs& outputs, CliContext& context) {
+Result<int> run_plan_drive(PlanOptions& options, const Config& config, CliContext& context) {
+  Outputs& outputs = options.outputs;
   const Problem& problem = config.problem;
   const GroundRobot robot = problem.ground->robot_at(problem.values);
   const auto value = [&](const char* key) { return problem.values[problem.table().row(key)]; };
@@ -260,15 +250,15 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
     outputs.reads_runs(config.trial_files);
     ASSIGN_OR_RETURN(recorded, read_run_folders(config.trial_files, robot.channels));
   }
-  plan::DriveSettings settings = options.settings;
+  plan::DriveSettings& settings = options.drive;
   ASSIGN_OR_RETURN(settings.wanted, wanted_of(options.wanted, kinematic_rows(robot)));
   ASSIGN_OR_RETURN(settings.limits, limits_of(options.limits, robot.channels, recorded));
-  RETURN_IF_ERROR(outputs.plan_in(task.out, {"commands.csv", "waypoints.csv"}));
-  RETURN_IF_ERROR(outputs.plan({task.picture}));
+  RETURN_IF_ERROR(outputs.plan_in(options.out, {"commands.csv", "waypoints.csv"}));
+  RETURN_IF_ERROR(outputs.plan({options.picture}));
   if (context.dry_run) {
     return print_dry_run(fmt::format("plan a drive of {:.0f} s for {} into {}", settings.seconds,
-                                     task.source, task.out),
-                         {{"out", task.out}, {"seconds", settings.seconds}}, {}, config.farm,
+                                     options.source, options.out),
+                         {{"out", options.out}, {"seconds", settings.seconds}}, {}, config.farm,
                          context);
   }
   context.begun = true;
@@ -284,11 +274,11 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
   drive.drive.channels = robot.channels;
   const RunFiles files = format_runs(drive.drive);
   RETURN_IF_ERROR(outputs.write_in(
-      task.out, {{"commands.csv", files.commands}, {"waypoints.csv", files.poses}}));
-  if (!task.picture.empty()) {
-    RETURN_IF_ERROR(outputs.write(task.picture, drive_picture(drive, settings)));
+      options.out, {{"commands.csv", files.commands}, {"waypoints.csv", files.poses}}));
+  if (!options.picture.empty()) {
+    RETURN_IF_ERROR(outputs.write(options.picture, drive_picture(drive, settings)));
   }
-  const auto [text, json] = result_of(drive, others, noise, settings.wanted, task);
+  const auto [text, json] = result_of(drive, others, noise, settings.wanted, options.out);
   context.console.result(text, json);
   return kExitDone;
 }

@@ -1,34 +1,27 @@
-// gapfarm plan of a ground robot: a drive that shows the values of its kinematics.
+// gapfarm plan: what its parts share.
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <string>
-#include <vector>
-
-#include "common/config/settings.h"
-#include "master/command/console.h"
 #include "master/command/outputs.h"
+#include "master/experiments/plan/design.h"
 #include "master/experiments/plan/drive_knowledge.h"
 
 namespace gapfarm {
 
-struct DriveOptions {
-  plan::DriveSettings settings;
+struct PlanOptions : LongOptions {
+  std::string source;
+  std::string picture;
+  std::string place;
+  plan::PlanSettings settings;
+  std::optional<unsigned> sessions, chain;
+  std::vector<double> levels, durations;
+  // Of a ground robot.
+  plan::DriveSettings drive;
   std::vector<std::string> wanted;  // NAME or NAME=WIDTH
   std::vector<std::string> limits;  // CHANNEL=MOST or CHANNEL=LEAST,MOST
-
-  void declare(CLI::App& app);
 };
 
-struct DriveTask {
-  std::string source;  // of the config
-  std::string out;     // folder
-  std::string picture;
-};
-
-// Writes commands.csv and waypoints.csv.  REQUIRES: `config` has a ground robot, `outputs` knows
-// what is read.
-Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, const Config& config,
-                           Outputs& outputs, CliContext& context);
+// A drive that shows the values of a ground robot's kinematics: writes commands.csv and
+// waypoints.csv.  REQUIRES: `config` has a ground robot, the outputs know what is read.
+Result<int> run_plan_drive(PlanOptions& options, const Config& config, CliContext& context);
 
 }  // namespace gapfarm

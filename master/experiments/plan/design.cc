@@ -127,7 +127,7 @@ class Designer {
   }
 
   Result<Signals> signals_of(const TrialLog& log) {
-    return signals(farm_, config_.problem, log, {effects_, settings_.seed});
+    return signals(farm_, config_.problem, log, effects_, settings_.seed);
   }
 
   Result<std::vector<Chain>> choose(double* best_share) {

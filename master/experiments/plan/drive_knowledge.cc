@@ -9,8 +9,7 @@
 namespace gapfarm::plan {
 namespace {
 
-constexpr double kSlopeStep = 0.1;  // of a tolerance
-constexpr double kKnown = 1e-4;     // of a reading's variance: as good as none
+constexpr double kKnown = 1e-4;  // of a reading's variance: as good as none
 
 }  // namespace
 
@@ -81,47 +80,6 @@ Eigen::MatrixXd Knowledge::most_of(const std::vector<Pose>& steps,
 Eigen::Vector3d Knowledge::reading() const {
   return {noise_.position_m * noise_.position_m, noise_.position_m * noise_.position_m,
           noise_.heading_rad * noise_.heading_rad};
-}
-
-Steps::Steps(const GroundRobot& robot, const std::vector<KinematicRow>& rows)
-    : robot_(robot), rows_(rows) {
-  for (const KinematicRow& row : rows) {
-    const double least = is_magnitude(row.name) ? row.tolerance : row.nominal;
-    nominal_.add(row.name, std::max(row.nominal, least));
-  }
-}
-
-std::vector<Pose> Steps::between(const CommandedRun& run,
-                                 const std::vector<double>& times_s) const {
-  return steps(run, times_s, nominal_);
-}
-
-std::vector<Eigen::MatrixXd> Steps::slopes(const CommandedRun& run,
-                                           const std::vector<double>& times_s,
-                                           const std::vector<Pose>& at) const {
-  const auto n = static_cast<Eigen::Index>(rows_.size());
-  std::vector<Eigen::MatrixXd> slopes(at.size(), Eigen::MatrixXd::Zero(3, n));
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const double h = kSlopeStep * rows_[static_cast<std::size_t>(k)].tolerance;
-    Kinematics moved = nominal_;
-    moved.values[k] += h;
-    const std::vector<Pose> there = steps(run, times_s, moved);
-    for (std::size_t i = 0; i < at.size(); ++i) {
-      slopes[i].col(k) = local_difference(at[i], there[i]) / h;
-    }
-  }
-  return slopes;
-}
-
-std::vector<Pose> Steps::steps(const CommandedRun& run, const std::vector<double>& times_s,
-                               const Kinematics& kinematics) const {
-  std::vector<Trial> trials(times_s.size() - 1);
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    trials[i].run = 0;
-    trials[i].t_s = times_s[i];
-    trials[i].duration_s = times_s[i + 1] - times_s[i];
-  }
-  return kinematic_ends(robot_, {&run, 1}, trials, kinematics);
 }
 
 }  // namespace gapfarm::plan

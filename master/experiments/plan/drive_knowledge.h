@@ -56,28 +56,6 @@ class Knowledge {
   Eigen::MatrixXd P_;
 };
 
-// The marker's steps between times, and how they change with the rows.  What slows down by its size
-// (lags, drags) stands at least its tolerance above 0: a lag of 0 looks like a delay, and a drag of
-// 0 like none.  REQUIRES: times that ascend, at least two.
-class Steps {
- public:
-  // Both outlive it.
-  Steps(const GroundRobot& robot, const std::vector<KinematicRow>& rows);
-
-  std::vector<Pose> between(const CommandedRun& run, const std::vector<double>& times_s) const;
-  // Of all steps `at`, 3 by rows, in the axes of their ends.
-  std::vector<Eigen::MatrixXd> slopes(const CommandedRun& run, const std::vector<double>& times_s,
-                                      const std::vector<Pose>& at) const;
-
- private:
-  std::vector<Pose> steps(const CommandedRun& run, const std::vector<double>& times_s,
-                          const Kinematics& kinematics) const;
-
-  const GroundRobot& robot_;
-  const std::vector<KinematicRow>& rows_;
-  Kinematics nominal_;
-};
-
 // What a ground robot should drive so that its log shows the values of its kinematics, and how well
 // a drive shows them.
 

@@ -12,12 +12,65 @@
 namespace gapfarm::plan {
 namespace {
 
-constexpr double kMemory_s = 5;  // for which a command before a move still shows in it
-constexpr double kStands = 0.1;  // of a usual rate
-constexpr double kRest_s = 1;    // at the end
+constexpr double kSlopeStep = 0.1;  // of a tolerance
+constexpr double kMemory_s = 5;     // for which a command before a move still shows in it
+constexpr double kStands = 0.1;     // of a usual rate
+constexpr double kRest_s = 1;       // at the end
 constexpr double kPoseEvery_s = 0.1;
 constexpr double kMoves_s[] = {0.5, 1, 2, 4};
 constexpr double kLevels[] = {-1, -0.5, 0, 0.5, 1};
+
+// The marker's steps between times, and how they change with the rows.  What slows down by its size
+// (lags, drags) stands at least its tolerance above 0: a lag of 0 looks like a delay, and a drag of
+// 0 like none.  REQUIRES: times that ascend, at least two.
+class Steps {
+ public:
+  // Both outlive it.
+  Steps(const GroundRobot& robot, const std::vector<KinematicRow>& rows)
+      : robot_(robot), rows_(rows) {
+    for (const KinematicRow& row : rows) {
+      const double least = is_magnitude(row.name) ? row.tolerance : row.nominal;
+      nominal_.add(row.name, std::max(row.nominal, least));
+    }
+  }
+
+  std::vector<Pose> between(const CommandedRun& run, const std::vector<double>& times_s) const {
+    return steps(run, times_s, nominal_);
+  }
+
+  // Of all steps `at`, 3 by rows, in the axes of their ends.
+  std::vector<Eigen::MatrixXd> slopes(const CommandedRun& run, const std::vector<double>& times_s,
+                                      const std::vector<Pose>& at) const {
+    const auto n = static_cast<Eigen::Index>(rows_.size());
+    std::vector<Eigen::MatrixXd> slopes(at.size(), Eigen::MatrixXd::Zero(3, n));
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double h = kSlopeStep * rows_[static_cast<std::size_t>(k)].tolerance;
+      Kinematics moved = nominal_;
+      moved.values[k] += h;
+      const std::vector<Pose> there = steps(run, times_s, moved);
+      for (std::size_t i = 0; i < at.size(); ++i) {
+        slopes[i].col(k) = local_difference(at[i], there[i]) / h;
+      }
+    }
+    return slopes;
+  }
+
+ private:
+  std::vector<Pose> steps(const CommandedRun& run, const std::vector<double>& times_s,
+                          const Kinematics& kinematics) const {
+    std::vector<Trial> trials(times_s.size() - 1);
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      trials[i].run = 0;
+      trials[i].t_s = times_s[i];
+      trials[i].duration_s = times_s[i + 1] - times_s[i];
+    }
+    return kinematic_ends(robot_, {&run, 1}, trials, kinematics);
+  }
+
+  const GroundRobot& robot_;
+  const std::vector<KinematicRow>& rows_;
+  Kinematics nominal_;
+};
 
 struct Move {
   std::vector<double> command;
@@ -196,9 +249,8 @@ class Planner {
       Chosen candidate = learned(moves);
       ++i;
       if (settings_.random) return candidate;
-      double seconds = 0;
-      for (const Move& move : moves) seconds += move.seconds;
-      const double rate = (before - spread(candidate.known.widths())) / seconds;
+      const double rate =
+          (before - spread(candidate.known.widths())) / sum_of(moves, &Move::seconds);
       if (rate <= best_rate) continue;
       best_rate = rate;
       best = std::move(candidate);

@@ -72,16 +72,12 @@ struct Signals {
   Signals of(const std::vector<std::size_t>& trials) const;
 };
 
-struct SignalSettings {
-  std::vector<std::size_t> effects;  // of the table; those on the spread alone have no shift
-  std::uint64_t seed = 1;
-};
-
-// By differences of predictions at the problem's own values; an effect that no strength lets be
-// simulated has no shift.  REQUIRES: a scenario with a diagnosis_subject(); a log that is not
-// empty.  Errors: the farm's, and a robot that does not drive at all.
+// By differences of predictions at the problem's own values.  `effects`: of the table; those on the
+// spread alone, and those that no strength lets be simulated, have no shift.  REQUIRES: a scenario
+// with a diagnosis_subject(); a log that is not empty.  Errors: the farm's, and a robot that does
+// not drive at all.
 Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
-                        const SignalSettings& settings);
+                        const std::vector<std::size_t>& effects, std::uint64_t seed);
 
 struct Visibility {
   std::string effect;
