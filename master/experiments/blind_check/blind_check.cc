@@ -4,9 +4,13 @@
 #include <filesystem>
 
 #include "common/base/ranges.h"
+#include "common/config/model.h"
+#include "common/math/statistics.h"
 #include "common/trials/files.h"
 #include "common/trials/write.h"
 #include "master/experiments/blind_check/cases/seal.h"
+#include "master/experiments/crossfit/crossfit.h"
+#include "master/farm/planned_trials.h"
 
 namespace gapfarm {
 namespace {
@@ -32,17 +36,12 @@ Status check_fresh(const CheckPaths& paths) {
   return Error{paths.out + ": holds another blind check, or a finished one; choose another --out"};
 }
 
-Status make_out(const std::string& out) {
-  std::error_code code;
-  fs::create_directories(out, code);
-  if (code) return Error{out + ": cannot be made: " + code.message()};
-  return {};
-}
-
 Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settings,
                           const BlindCheckHooks& hooks, const CheckPaths& paths) {
   RETURN_IF_ERROR(check_fresh(paths));
-  RETURN_IF_ERROR(make_out(paths.out));
+  std::error_code code;
+  fs::create_directories(paths.out, code);
+  if (code) return Error{paths.out + ": cannot be made: " + code.message()};
   hooks.stages.began(0);
   ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
   ASSIGN_OR_RETURN(const auto planned,
@@ -102,28 +101,72 @@ Status open_truths(const InHand& hand, const CheckPaths& paths) {
   return write_file_atomically(paths.opened_truths(), format_sealed(hand.sealed));
 }
 
+// A case whose diagnosis left its models.
+struct DiagnosedCase {
+  std::size_t place = 0;  // among all
+  ParameterValues tuned;  // of the base alone
+  Model final_;           // with the named effects; may have a [residual]
+};
+
+// tuned.toml and model.toml in `folder`; none when one is missing or of another scenario.
+std::optional<DiagnosedCase> read_diagnosed(std::size_t place, const std::string& folder) {
+  const Result<Model> tuned = read_model(folder + "/tuned.toml");
+  Result<Model> final_model = read_model(folder + "/model.toml");
+  if (!tuned || !final_model || tuned->scenario != final_model->scenario) return std::nullopt;
+  return DiagnosedCase{place, tuned->values, *std::move(final_model)};
+}
+
+std::optional<double> mean_log_score(const PredictedEnds& predicted) {
+  if (predicted.log_scores.empty()) return std::nullopt;
+  return mean(predicted.log_scores);
+}
+
+// How models predict a second log of the truth, which the problem is about.  None: a prediction did
+// not end well.
+Result<std::optional<FreshScores>> score_fresh(Problem problem, const DiagnosedCase& of,
+                                               Farm& farm) {
+  const std::vector<ParameterValues> points = {of.tuned, of.final_.values, problem.values};
+  ASSIGN_OR_RETURN(const auto predicted, predict_ends(problem, points, farm, true));
+  const auto scores = mapped(predicted, mean_log_score);
+  if (!scores[0] || !scores[1] || !scores[2]) return std::optional<FreshScores>();
+  FreshScores fresh{*scores[0], *scores[1], *scores[2], std::nullopt};
+  if (!of.final_.residual.empty()) {
+    problem.residual = of.final_.residual;
+    ASSIGN_OR_RETURN(const auto corrected, predict_ends(problem, {of.final_.values}, farm, true));
+    fresh.corrected = mean_log_score(corrected.front());
+  }
+  return std::optional(fresh);
+}
+
 // Promised against realised, for the cases in which an effect was named; and what is closed of
-// effects that could not be.
+// effects that could not be.  Each on a second log of its truth: other noise and, without a plan of
+// the settings, another plan.
 Status add_realised(const Config& config, const BlindCheckSettings& settings,
                     const BlindCheckHooks& hooks, const CheckPaths& paths,
                     std::vector<ScoredCase>& cases) {
   std::vector<DiagnosedCase> diagnosed;
-  std::vector<std::size_t> owner;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     if (!cases[i].promised && cases[i].truth.excluded.empty()) continue;
-    auto models = read_diagnosed_case(cases[i].truth, paths.diagnosis(cases[i].truth.id));
-    if (!models) continue;
-    diagnosed.push_back(std::move(*models));
-    owner.push_back(i);
+    auto models = read_diagnosed(i, paths.diagnosis(cases[i].truth.id));
+    if (models) diagnosed.push_back(*std::move(models));
   }
   if (diagnosed.empty()) return {};
   hooks.stages.began(3);
   ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
-  ASSIGN_OR_RETURN(const auto fresh, score_fresh_logs(config, diagnosed, settings.plan, *farm));
-  for (std::size_t i = 0; i < owner.size(); ++i) {
-    if (!fresh[i]) continue;
-    cases[owner[i]].fresh = fresh[i];
-    if (cases[owner[i]].promised) cases[owner[i]].realised = realised_shrinkage(*fresh[i]);
+  const auto truths =
+      mapped(diagnosed, [&](const DiagnosedCase& d) { return cases[d.place].truth; });
+  ASSIGN_OR_RETURN(std::vector<TrialLog> logs,
+                   simulate_cases(config, truths, settings.plan, /*seed_offset=*/1, *farm));
+  for (std::size_t i = 0; i < diagnosed.size(); ++i) {
+    Problem problem = without_log(config.problem);
+    problem.log = std::move(logs[i]);
+    for (Trial& trial : problem.log.trials) trial.path.clear();
+    for (const v1::Override& o : overrides_of(problem.table(), truths[i])) {
+      problem.values[o.parameter()] = o.value();
+    }
+    ScoredCase& scored = cases[diagnosed[i].place];
+    ASSIGN_OR_RETURN(scored.fresh, score_fresh(std::move(problem), diagnosed[i], *farm));
+    if (scored.fresh && scored.promised) scored.realised = realised_shrinkage(*scored.fresh);
   }
   return {};
 }

@@ -1,23 +1,113 @@
 #include "master/experiments/blind_check/tally.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
 
 #include "common/base/ranges.h"
-#include "common/config/model.h"
-#include "common/math/statistics.h"
-#include "master/experiments/crossfit/crossfit.h"
-#include "master/farm/planned_trials.h"
+#include "common/base/text.h"
+#include "master/diagnose/effect_diagnosis.h"
 
 namespace gapfarm {
 namespace {
 
+constexpr std::size_t kMaxAliases = 3;  // more say nothing
+constexpr double kPromiseTolerance = 0.1;
+constexpr double kNearBound[] = {0.9, 1.3};  // of a fit's width, in those of the bound
+constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
+
+using Family = std::set<std::string>;
+
+Family family_of(const NamedEffect& effect) {
+  Family family = {effect.name};
+  const std::size_t count = std::min(effect.aliases.size(), kMaxAliases);
+  family.insert(effect.aliases.begin(), effect.aliases.begin() + static_cast<long>(count));
+  return family;
+}
+
+std::string names_of(const Diagnosis& diagnosis) {
+  std::string text = joined(diagnosis.effects, "+", &NamedEffect::name);
+  return verdict_name(diagnosis.verdict) + (text.empty() ? "" : " " + text);
+}
+
+std::string names_of(const Truth& truth) { return joined(truth.effects, "+", &TrueEffect::name); }
+
+Judgement judge_effects(const Truth& truth, const Diagnosis& diagnosis) {
+  const std::string what = names_of(truth);
+  if (diagnosis.verdict != Verdict::kEffect && diagnosis.verdict != Verdict::kEffectAndUnknown) {
+    return {false, what + "; reported " + verdict_name(diagnosis.verdict)};
+  }
+  std::vector<NamedEffect> left = diagnosis.effects;
+  // By name first: one name may be another one's alias, and be there beside it.
+  const auto hit_by = [&](const TrueEffect& effect, bool by_alias) {
+    return std::ranges::find_if(left, [&](const NamedEffect& one) {
+      return by_alias ? family_of(one).count(effect.name) > 0 : one.name == effect.name;
+    });
+  };
+  std::vector<TrueEffect> others;
+  for (const TrueEffect& effect : truth.effects) {
+    const auto hit = hit_by(effect, false);
+    if (hit == left.end()) others.push_back(effect);
+    if (hit != left.end()) left.erase(hit);
+  }
+  for (const TrueEffect& effect : others) {
+    const auto hit = hit_by(effect, true);
+    if (hit == left.end()) {
+      return {false, what + "; missed " + effect.name + ", reported " + names_of(diagnosis)};
+    }
+    left.erase(hit);
+  }
+  if (truth.effects.size() == 1 &&
+      family_of(diagnosis.effects.front()).count(truth.effects.front().name) == 0) {
+    return {false, what + "; named after " + diagnosis.effects.front().name};
+  }
+  if (!left.empty()) return {false, what + "; also reported more: " + names_of(diagnosis)};
+  return {true, what + "; reported " + names_of(diagnosis)};
+}
+
+// Strengths all neutral: places and directions mean nothing.
+bool does_nothing(const Effect& entry, const TrueEffect& effect) {
+  return std::ranges::all_of(std::span(entry.parameters).first(entry.strengths), [&](auto& p) {
+    const double* stated = find_in(effect.parameters, p.key);
+    return !stated || *stated == p.nominal;
+  });
+}
+
+// `turn`: after which the value means the same; 0: never.
+bool holds(double lo, double hi, double value, double turn) {
+  if (turn == 0) return value >= lo && value <= hi;
+  // The turn of `value` that is the first at or above lo.
+  return value + turn * std::ceil((lo - value) / turn) <= hi;
+}
+
+// Effects without an arrow: half a turn changes nothing, and a quarter of one undoes them.
+bool has_no_arrow(const std::string& effect) {
+  const std::optional<Polar>& polar = effect_diagnosis(effect).polar;
+  return polar && polar->symmetry == 2;
+}
+
+// The same effect with its strength above neutral, as a diagnosis shows it.
+std::map<std::string, double> as_reported(const TrueEffect& effect) {
+  std::map<std::string, double> stated = effect.parameters;
+  if (!has_no_arrow(effect.name) || !stated.count("direction")) return stated;
+  double *ratio = find_in(stated, "ratio"), *stretch = find_in(stated, "stretch");
+  if (!(ratio && *ratio < 1) && !(stretch && *stretch < 0)) return stated;
+  if (ratio) *ratio = 1 / *ratio;
+  if (stretch) *stretch = -*stretch;
+  stated["direction"] += std::numbers::pi / 2;
+  return stated;
+}
+
+// The first named effect, or the verdict when none is named.
+std::string first_reported(const Diagnosis& diagnosis) {
+  return diagnosis.effects.empty() ? verdict_name(diagnosis.verdict)
+                                   : diagnosis.effects.front().name;
+}
+
 // Nats a trial that must be there to explain, for shares of it to mean anything.
 constexpr double kLeastGap = 0.02;
-
-std::optional<double> mean_log_score(const PredictedEnds& predicted) {
-  if (predicted.log_scores.empty()) return std::nullopt;
-  return mean(predicted.log_scores);
-}
 
 // What the truth gains over the tuned base; none: too little.
 std::optional<double> gap_of(const FreshScores& scores) {
@@ -57,46 +147,71 @@ void add_kind(const ScoredCase& c, Tally& sum) {
 
 }  // namespace
 
-std::optional<DiagnosedCase> read_diagnosed_case(const Truth& truth, const std::string& folder) {
-  const Result<Model> tuned = read_model(folder + "/tuned.toml");
-  const Result<Model> final_model = read_model(folder + "/model.toml");
-  if (!tuned || !final_model || tuned->scenario != final_model->scenario) return std::nullopt;
-  return DiagnosedCase{truth, tuned->values, final_model->values, final_model->residual};
-}
-
-Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
-    const Config& config, const std::vector<DiagnosedCase>& cases, const SessionPlans& plan,
-    Farm& farm) {
-  const std::vector<Truth> truths = mapped(cases, &DiagnosedCase::truth);
-  ASSIGN_OR_RETURN(std::vector<TrialLog> logs,
-                   simulate_cases(config, truths, plan, /*seed_offset=*/1, farm));
-  std::vector<std::optional<FreshScores>> scores;
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    Problem problem = without_log(config.problem);
-    problem.log = std::move(logs[i]);
-    for (Trial& trial : problem.log.trials) trial.path.clear();
-    for (const v1::Override& o : overrides_of(problem.table(), truths[i])) {
-      problem.values[o.parameter()] = o.value();
-    }
-    ASSIGN_OR_RETURN(
-        const auto predicted,
-        predict_ends(problem, {cases[i].tuned, cases[i].final_, problem.values}, farm, true));
-    const auto tuned = mean_log_score(predicted[0]);
-    const auto final_score = mean_log_score(predicted[1]);
-    const auto truth = mean_log_score(predicted[2]);
-    scores.emplace_back();
-    if (tuned && final_score && truth) {
-      scores.back() = FreshScores{*tuned, *final_score, *truth, std::nullopt};
-    }
-    if (scores.back() && !cases[i].residual.empty()) {
-      Problem corrected = problem;
-      corrected.residual = cases[i].residual;
-      ASSIGN_OR_RETURN(const auto with_residual,
-                       predict_ends(corrected, {cases[i].final_}, farm, true));
-      scores.back()->corrected = mean_log_score(with_residual.front());
+std::optional<bool> missed_below(const Truth& truth, const Diagnosis& diagnosis) {
+  std::optional<bool> below;
+  for (const TrueEffect& effect : truth.effects) {
+    const bool named = std::ranges::any_of(diagnosis.effects, [&](const NamedEffect& one) {
+      return family_of(one).count(effect.name) > 0;
+    });
+    const Effect* entry = catalogue_entry(effect.name);
+    const auto* screened = find_by(diagnosis.screening, effect.name, &Screened::effect);
+    if (named || !entry || !screened || truth.kind == CaseKind::kOutside) continue;
+    for (std::size_t i = 0; i < entry->strengths; ++i) {
+      const Parameter& p = entry->parameters[i];
+      const double* value = find_in(effect.parameters, p.key);
+      const auto* from = find_by(screened->detectable_from, p.key, [](auto& f) { return f.first; });
+      if (!value || !from || !std::isfinite(from->second)) continue;
+      below = below.value_or(true) && std::abs(*value - p.nominal) < from->second;
     }
   }
-  return scores;
+  return below;
+}
+
+Judgement judge(const Truth& truth, const Diagnosis& diagnosis) {
+  const Verdict verdict = diagnosis.verdict;
+  const bool names_none = diagnosis.effects.empty();
+  for (const NamedEffect& effect : diagnosis.effects) {
+    if (effect.aliases.size() <= kMaxAliases) continue;
+    return {false, "more than " + std::to_string(kMaxAliases) + " aliases say nothing"};
+  }
+  if (truth.kind == CaseKind::kNull) {
+    return {verdict == Verdict::kNone && names_none, "null; reported " + names_of(diagnosis)};
+  }
+  if (truth.kind != CaseKind::kOutside) return judge_effects(truth, diagnosis);
+  const bool unknown = verdict == Verdict::kUnknown || verdict == Verdict::kEffectAndUnknown;
+  return {unknown && names_none, "outside the catalogue; reported " + names_of(diagnosis)};
+}
+
+std::vector<Coverage> coverage_of(const Truth& truth, const Diagnosis& diagnosis) {
+  std::vector<Coverage> all;
+  for (const TrueEffect& effect : truth.effects) {
+    const auto named = std::ranges::find(diagnosis.effects, effect.name, &NamedEffect::name);
+    const Effect* entry = catalogue_entry(effect.name);
+    if (named == diagnosis.effects.end() || !entry) continue;
+    const bool neutral = does_nothing(*entry, effect);
+    const std::map<std::string, double> stated = as_reported(effect);
+    for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
+      const Parameter& p = entry->parameters[i];
+      const double* value = find_in(stated, p.key);
+      if (!value || !p.choices.empty() || (neutral && i >= entry->strengths)) continue;
+      Coverage coverage{effect.name, p.key, *value, kAbsent, kAbsent, false};
+      coverage.is_strength = i < entry->strengths;
+      for (const Estimate& s : named->parameters) {
+        if (s.key != p.key || !std::isfinite(s.lo) || !std::isfinite(s.hi)) continue;
+        coverage.lo = s.lo;
+        coverage.hi = s.hi;
+        // A direction's bounds are a whole turn of it apart.
+        const double turn = p.key == "direction" ? p.upper - p.lower : 0;
+        coverage.covered = holds(s.lo, s.hi, *value, turn);
+        if (!s.sd || !(*s.sd > 0)) continue;
+        const double half = kNormal90 * *s.sd;
+        coverage.covered_by_fit = holds(s.value - half, s.value + half, *value, turn);
+        if (s.bound && *s.bound > 0) coverage.fit_over_bound = *s.sd / *s.bound;
+      }
+      all.push_back(coverage);
+    }
+  }
+  return all;
 }
 
 std::optional<double> realised_shrinkage(const FreshScores& scores) {
@@ -125,7 +240,7 @@ ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Dia
     scored.judgement.why += *below ? "; below what this log shows" : "; ours: this log shows it";
   }
   scored.coverage = coverage_of(truth, *scored.reported);
-  const double promised = promised_shrinkage(*scored.reported);
+  const double promised = sum_of(scored.reported->effects, &NamedEffect::closed);
   if (!scored.reported->effects.empty() && std::isfinite(promised)) scored.promised = promised;
   return scored;
 }

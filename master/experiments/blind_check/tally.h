@@ -57,8 +57,6 @@ Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& op
 
 // Is a diagnosis right?  The rules by which every case is judged.
 
-constexpr std::size_t kMaxAliases = 3;  // more say nothing
-
 struct Judgement {
   bool right = false;
   std::string why;  // "floor_nap; reported unknown"
@@ -72,9 +70,6 @@ Judgement judge(const Truth& truth, const Diagnosis& diagnosis);
 // Whether an effect that is there was not named, and all such have every strength nearer to neutral
 // than the diagnosis says that its log shows; none: nothing was missed, or it says of none.
 std::optional<bool> missed_below(const Truth& truth, const Diagnosis& diagnosis);
-
-// The first named effect, or the verdict when none is named.
-std::string first_reported(const Diagnosis& diagnosis);
 
 // Whether the interval of one true parameter held it.
 struct Coverage {
@@ -95,10 +90,6 @@ struct Coverage {
 // parameters.  Angles are compared on the circle.  Omitted: choices (they have no interval) and
 // what means nothing since the effect's strengths are neutral.
 std::vector<Coverage> coverage_of(const Truth& truth, const Diagnosis& diagnosis);
-
-// The share of the explainable gap that the diagnosis promises its effects close: the sum of
-// `closed`, NaN when an effect has none.  0 without effects.
-double promised_shrinkage(const Diagnosis& diagnosis);
 
 struct Rate {
   unsigned hits = 0;
@@ -142,9 +133,6 @@ struct ScoredCase {
 // Judges a case; a diagnosis that failed is wrong.
 ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Diagnosis> reported);
 
-constexpr double kPromiseTolerance = 0.1;
-constexpr double kNearBound[] = {0.9, 1.3};  // of a fit's width, in those of the bound
-
 struct Tally {
   Rate right;            // of all
   Rate failed;           // diagnoses that crashed, ended late or left no answer, of all
@@ -159,7 +147,7 @@ struct Tally {
   Rate fits_at_bound;                      // which are 0.9 to 1.3 times as wide as the bound
   Rate
       missed_below;  // of missed effects of which the diagnosis says it: smaller than its log shows
-  Rate promise_kept;                          // |promised - realised| <= kPromiseTolerance
+  Rate promise_kept;                          // |promised - realised| <= 0.1
   std::map<std::string, Rate> singles_right;  // by level
   std::map<std::string, Rate> singles_first;  // by level; the true name itself came first
   std::map<std::string, std::map<std::string, Rate>> by_effect;  // effect, level
@@ -170,27 +158,6 @@ struct Tally {
 
 // Cases without a truth count nowhere.
 Tally tally(const std::vector<ScoredCase>& cases);
-
-// What a diagnosis really gained: its models against the truth on a fresh log of the same robot.
-
-// A case whose diagnosis left its models.
-struct DiagnosedCase {
-  Truth truth;
-  ParameterValues tuned;   // of the base alone
-  ParameterValues final_;  // with the named effects
-  Residual residual;       // that its model.toml adds; may be empty
-};
-
-// tuned.toml and model.toml in `folder`; none when one is missing or of another scenario.
-std::optional<DiagnosedCase> read_diagnosed_case(const Truth& truth, const std::string& folder);
-
-// For each case, simulates a second log of its truth (other noise and, without `plan`, another
-// plan), and has the tuned base, the diagnosis's model, with its [residual] where it has one, and
-// the truth predict it.  None for a case in which a prediction did not end well.  Errors: the
-// farm's own.
-Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
-    const Config& config, const std::vector<DiagnosedCase>& cases, const SessionPlans& plan,
-    Farm& farm);
 
 // The blind check's result for people and for programs.
 

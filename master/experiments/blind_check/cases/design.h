@@ -43,11 +43,8 @@ struct BlindDesign {
 };
 
 // What a case's robot may differ by from the config's: each factor is log-uniform within
-// [1 / spread, spread].  Parameters that are genes of the config stay within the genes' ranges; in
-// a config with genes those that are not stay as they are, noise excepted.
-//   mass 1.25, contact_length 1.1, track_gauge 1.08, friction 1.3, friction_ratio 1.15,
-//   full_speed 1.12, maximum_velocity 1.12, motor_torque 1.2, each noise parameter 1.2,
-//   shape_factor 1.15, pressure 1.3, ground_friction 1.5, finger_friction 1.3
+// [1 / spread, spread] (kSpreads).  Parameters that are genes of the config stay within the genes'
+// ranges; in a config with genes those that are not stay as they are, noise excepted.
 std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream);
 
 // Draws robots and effects, and searches every strength on the farm, all cases side by side, on
