@@ -83,16 +83,11 @@ class Lane {
   int idle_ = 0;
 };
 
-struct Asked {
-  std::size_t lane = 0;
-  std::size_t count = 0;
-};
-
 }  // namespace
 
 Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
-                                         const CompareOptions& options, const CompareScorer& scorer,
-                                         const std::function<void(std::uint64_t)>& on_round) {
+                                         const CompareOptions& options,
+                                         const CompareScorer& scorer) {
   std::vector<Lane> lanes;
   for (std::size_t v = 0; v < variants.size(); ++v) {
     for (unsigned s = 0; s < options.seeds; ++s) {
@@ -103,18 +98,15 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
   }
   for (;;) {
     std::vector<CompareRequest> requests;
-    std::vector<Asked> asked;
-    std::uint64_t done = 0;
+    std::vector<std::size_t> asked(lanes.size());  // requests a lane
     for (std::size_t i = 0; i < lanes.size(); ++i) {
-      done += lanes[i].run.evaluations;
       if (lanes[i].done()) continue;
       const std::vector<Candidate> candidates = lanes[i].ask();
       for (const Candidate& candidate : candidates) {
         requests.push_back({lanes[i].run.variant, lanes[i].run.seed, candidate});
       }
-      if (!candidates.empty()) asked.push_back({i, candidates.size()});
+      asked[i] = candidates.size();
     }
-    if (on_round) on_round(done);
     if (requests.empty()) break;
     ASSIGN_OR_RETURN(const auto scores, scorer(requests));
     if (scores.size() != requests.size()) {
@@ -122,9 +114,9 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
                    std::to_string(scores.size())};
     }
     std::span<const Score> rest = scores;
-    for (const Asked& part : asked) {
-      lanes[part.lane].tell(rest.first(part.count));
-      rest = rest.subspan(part.count);
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+      if (asked[i] > 0) lanes[i].tell(rest.first(asked[i]));
+      rest = rest.subspan(asked[i]);
     }
   }
   return mapped(lanes, [](Lane& lane) { return std::move(lane.run); });

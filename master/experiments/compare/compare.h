@@ -47,11 +47,11 @@ using CompareScorer =
 void name_apart(std::vector<Variant>& variants);
 
 // Runs all of them in step, so that a farm always has work.  Every run of a variant is the run that
-// `evolve` would make with that seed, but for its stop conditions.  `on_round` gets how many
-// evaluations of all are done.  Errors: of the optimisers' setup and of the scorer.
-Result<std::vector<ComparedRun>> compare(
-    std::span<const Variant> variants, const CompareOptions& options, const CompareScorer& scorer,
-    const std::function<void(std::uint64_t done)>& on_round = {});
+// `evolve` would make with that seed, but for its stop conditions.   Errors: of the
+// optimisers' setup and of the scorer.
+Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
+                                         const CompareOptions& options,
+                                         const CompareScorer& scorer);
 
 // The farm as a scorer.  `farm` outlives it.
 CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants);

@@ -116,6 +116,41 @@ EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
   return errors;
 }
 
+ScoreCandidates scores_by(Farm& farm, const Problem& problem, std::uint64_t seed) {
+  const std::string hash = farm.add_problem(to_proto(problem));
+  return [&farm, hash, seed, fitness = problem.fitness](const std::vector<Candidate>& candidates,
+                                                        const TakeScore& take) {
+    const auto tasks_of = [&](const std::vector<Candidate>& of) {
+      return mapped(of, [&](const Candidate& c) { return evaluation_task(c, seed); });
+    };
+    const auto on_answer = [&](std::size_t place,
+                               const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
+      ASSIGN_OR_RETURN(const Score score, score_of(result, fitness));
+      ASSIGN_OR_RETURN(const auto more, take(place, score));
+      return tasks_of(more);
+    };
+    return farm.stream(hash, tasks_of(candidates), on_answer);
+  };
+}
+
+Result<Tuned> tune(const Problem& problem, Farm& farm, const CrossfitPlan& plan) {
+  OptimiserSetup setup = optimiser_setup(plan.evolution, problem, plan.seed);
+  setup.nominal = problem.genome_of(problem.values);
+  ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
+  EvolveOptions options;
+  options.settings = plan.evolution;
+  options.fitness = problem.fitness.kind;
+  const auto keep_none = [](const GenerationRecord&) { return Status(); };
+  ASSIGN_OR_RETURN(const auto summary, evolve(*optimiser, scores_by(farm, problem, plan.seed),
+                                              keep_none, monotonic_seconds, options));
+  if (!summary.best || summary.best->standing.outcome != v1::OK) {
+    return Error{"every genome failed; widen or move the genes' ranges"};
+  }
+  return Tuned{problem.values_of(summary.best->genome),
+               fitness_of_cost(problem.fitness.kind, summary.best->standing.cost),
+               summary.evaluations};
+}
+
 class Crossfit {
  public:
   Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
@@ -125,8 +160,7 @@ class Crossfit {
     CrossfitGroup group;
     group.name = name;
     ASSIGN_OR_RETURN(const TrialLog train, select_trials(log, plan_.train));
-    ASSIGN_OR_RETURN(const auto tuned, tune(with(train), farm_, plan_.tuning));
-    group.tuned = tuned;
+    ASSIGN_OR_RETURN(group.tuned, tune(with(train), farm_, plan_));
     RETURN_IF_ERROR(add_set("train", train, group));
     TrialLog tests;
     for (const std::vector<std::string>& filters : plan_.tests) {
@@ -242,29 +276,12 @@ class Crossfit {
 // A stage each group: its evaluations, its sets, its sweeps.
 std::vector<ProgressStage> stages_of(const std::vector<std::string>& groups,
                                      const CrossfitPlan& plan, std::size_t genes) {
-  const std::uint64_t tasks = most_evaluations(plan.tuning.evolution, genes) +
+  const std::uint64_t tasks = most_evaluations(plan.evolution, genes) +
                               2 * (1 + plan.tests.size()) +
                               2 * plan.sweeps.size() * plan.sweep_points;
   return mapped(groups, [&](const std::string& group) {
     return ProgressStage{group.empty() ? "fit" : "fit " + plan.by + "=" + group, 1, tasks};
   });
-}
-
-ScoreCandidates scores_by(Farm& farm, const Problem& problem, std::uint64_t seed) {
-  const std::string hash = farm.add_problem(to_proto(problem));
-  return [&farm, hash, seed, fitness = problem.fitness](const std::vector<Candidate>& candidates,
-                                                        const TakeScore& take) {
-    const auto tasks_of = [&](const std::vector<Candidate>& of) {
-      return mapped(of, [&](const Candidate& c) { return evaluation_task(c, seed); });
-    };
-    const auto on_answer = [&](std::size_t place,
-                               const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
-      ASSIGN_OR_RETURN(const Score score, score_of(result, fitness));
-      ASSIGN_OR_RETURN(const auto more, take(place, score));
-      return tasks_of(more);
-    };
-    return farm.stream(hash, tasks_of(candidates), on_answer);
-  };
 }
 
 }  // namespace
@@ -287,24 +304,6 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
     groups.push_back(std::move(*group));
   }
   return groups;
-}
-
-Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings) {
-  OptimiserSetup setup = optimiser_setup(settings.evolution, problem, settings.seed);
-  setup.nominal = problem.genome_of(problem.values);
-  ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
-  EvolveOptions options;
-  options.settings = settings.evolution;
-  options.fitness = problem.fitness.kind;
-  const auto keep_none = [](const GenerationRecord&) { return Status(); };
-  ASSIGN_OR_RETURN(const auto summary, evolve(*optimiser, scores_by(farm, problem, settings.seed),
-                                              keep_none, monotonic_seconds, options));
-  if (!summary.best || summary.best->standing.outcome != v1::OK) {
-    return Error{"every genome failed; widen or move the genes' ranges"};
-  }
-  return Tuned{problem.values_of(summary.best->genome),
-               fitness_of_cost(problem.fitness.kind, summary.best->standing.cost),
-               summary.evaluations};
 }
 
 Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,

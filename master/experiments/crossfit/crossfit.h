@@ -12,19 +12,11 @@
 
 namespace gapfarm {
 
-struct TuningSettings {
-  EvolutionSettings evolution;  // optimiser and stop conditions, those of time apart
-  std::uint64_t seed = 1;
-};
-
 struct Tuned {
   ParameterValues values;
   double fitness = 0;  // in the fitness's own sense and unit
   std::uint64_t evaluations = 0;
 };
-
-// Errors: of the farm, and a problem whose every genome fails.
-Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings);
 
 // Where every trial of a log ends at some parameter values.
 struct PredictedEnds {
@@ -55,7 +47,8 @@ struct CrossfitPlan {
   std::vector<std::string> repeats;             // columns that make a condition; empty: unknown
   std::vector<std::string> sweeps;              // parameters to vary alone around the tuned values
   unsigned sweep_points = 11;
-  TuningSettings tuning;
+  EvolutionSettings evolution;  // optimiser and stop conditions, those of time apart
+  std::uint64_t seed = 1;
   StageHooks hooks;  // a stage each fit
 };
 
@@ -89,8 +82,8 @@ struct CrossfitGroup {
 // parameter that is not there, a fit or a set without trials.
 Status check_crossfit(const Problem& problem, const CrossfitPlan& plan);
 
-// REQUIRES: a problem with genes and a log.  Errors: of select_trials() and tune(); an untuned or a
-// tuned simulation that fails; a sweep of an unknown parameter.
+// REQUIRES: a problem with genes and a log.  Errors: of select_trials() and the farm; every
+// genome of a fit fails; an untuned or a tuned simulation does; a sweep of an unknown parameter.
 Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const CrossfitPlan& plan,
                                             Farm& farm);
 
