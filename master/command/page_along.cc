@@ -13,6 +13,7 @@
 
 #include "common/base/clock.h"
 #include "common/base/text.h"
+#include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/command/console.h"
 #include "master/serve/request.h"
@@ -40,19 +41,34 @@ std::string complaint(std::string output) {
   return output.empty() ? "it ended without a word" : output;
 }
 
-}  // namespace
-
-void PageOption::declare(CLI::App& app) {
-  app.add_flag("--page", along,
-               "Show it in a browser while it goes on (`gapfarm serve`), and print the address");
-  app.add_option("--page-port,--metrics", port,
-                 "The same on this port of 127.0.0.1 (0: any); /metrics there is for Prometheus")
-      ->check(CLI::Range(0, 65535))
-      ->type_name("PORT");
+// What the server reported until it served or ended.
+std::string hear(int out) {
+  std::string output;
+  std::array<char, 1024> bytes;
+  const double until_s = monotonic_seconds() + 1e-3 * kStartLimit_ms;
+  while (output.find(", then open") == output.npos) {
+    const double left_s = until_s - monotonic_seconds();
+    pollfd polled = {out, POLLIN, 0};
+    if (left_s <= 0 || ::poll(&polled, 1, static_cast<int>(1e3 * left_s) + 1) <= 0) break;
+    const ssize_t n = ::read(out, bytes.data(), bytes.size());
+    if (n <= 0) break;
+    output.append(bytes.data(), static_cast<std::size_t>(n));
+  }
+  return output;
 }
 
-Result<std::unique_ptr<PageAlong>> PageAlong::start(const std::filesystem::path& folder,
-                                                    unsigned port) {
+struct Server {
+  Server(pid_t pid, int its_out) : out(its_out), process(pid, /*patience_s=*/3) {}
+  ~Server() { ::close(out); }
+  Server& operator=(Server&&) = delete;
+
+  int out;  // its standard output
+  OwnedChild process;
+  unsigned port = 0;
+  std::string tunnel;  // "ssh -L ..."
+};
+
+Result<std::shared_ptr<Server>> start_server(const std::filesystem::path& folder, unsigned port) {
   std::array<int, 2> ends = {};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
     return Error{std::string("the page cannot be started: ") + std::strerror(errno)};
@@ -72,52 +88,45 @@ Result<std::unique_ptr<PageAlong>> PageAlong::start(const std::filesystem::path&
     ::close(ends[0]);
     return Error{"the page cannot be started: " + pid.error().message};
   }
-  std::unique_ptr<PageAlong> page(new PageAlong(*pid, ends[0]));
-  const std::string output = page->hear();
+  auto server = std::make_shared<Server>(*pid, ends[0]);
+  const std::string output = hear(ends[0]);
   const std::string digits = up_to(output, kAddress, "/");
-  page->tunnel_ = up_to(output, kTunnel, ",");
+  server->tunnel = up_to(output, kTunnel, ",");
   const auto [end, error] =
-      std::from_chars(digits.data(), digits.data() + digits.size(), page->port_);
-  if (digits.empty() || error != std::errc() || page->tunnel_.empty()) {
+      std::from_chars(digits.data(), digits.data() + digits.size(), server->port);
+  if (digits.empty() || error != std::errc() || server->tunnel.empty()) {
     return Error{"the page cannot be shown: " + complaint(output)};
   }
-  return page;
+  return server;
 }
 
-std::string PageAlong::hear() const {
-  std::string output;
-  std::array<char, 1024> bytes;
-  const double until_s = monotonic_seconds() + 1e-3 * kStartLimit_ms;
-  while (output.find(", then open") == output.npos) {
-    const double left_s = until_s - monotonic_seconds();
-    pollfd polled = {out_, POLLIN, 0};
-    if (left_s <= 0 || ::poll(&polled, 1, static_cast<int>(1e3 * left_s) + 1) <= 0) break;
-    const ssize_t n = ::read(out_, bytes.data(), bytes.size());
-    if (n <= 0) break;
-    output.append(bytes.data(), static_cast<std::size_t>(n));
-  }
-  return output;
+}  // namespace
+
+void PageOption::declare(CLI::App& app) {
+  app.add_flag("--page", along,
+               "Show it in a browser while it goes on (`gapfarm serve`), and print the address");
+  app.add_option("--page-port,--metrics", port,
+                 "The same on this port of 127.0.0.1 (0: any); /metrics there is for Prometheus")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("PORT");
 }
 
-PageAlong::~PageAlong() { ::close(out_); }
-
-Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
-                                             const std::filesystem::path& folder,
-                                             CliContext& context) {
-  if (!option.wanted()) return std::unique_ptr<PageAlong>();
+Result<std::shared_ptr<void>> open_page(const PageOption& option,
+                                        const std::filesystem::path& folder, CliContext& context) {
+  if (!option.wanted()) return std::shared_ptr<void>();
   const std::optional<unsigned>& named = option.port;
-  auto page = PageAlong::start(folder, named.value_or(kPagePort));
-  if (!page && !named) page = PageAlong::start(folder, 0);
-  if (!page) return page.error();
-  const std::string address = "http://127.0.0.1:" + std::to_string((*page)->port()) + "/";
+  auto server = start_server(folder, named.value_or(kPagePort));
+  if (!server && !named) server = start_server(folder, 0);
+  if (!server) return server.error();
+  const std::string address = "http://127.0.0.1:" + std::to_string((*server)->port) + "/";
   const std::string view =
       address + "view?of=" + percent_encoded(folder.lexically_normal().string());
   context.console.note("page: " + view);
-  context.console.note("  from another machine first: " + (*page)->tunnel());
+  context.console.note("  from another machine first: " + (*server)->tunnel);
   context.console.note("  it ends with this command; gapfarm serve " +
                        shell_quoted(folder.string()) + " shows the same at any time");
   if (named) context.console.note("metrics: " + address + "metrics");
-  return page;
+  return std::shared_ptr<void>(*std::move(server));
 }
 
 }  // namespace gapfarm

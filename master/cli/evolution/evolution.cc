@@ -210,7 +210,7 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   }
   log.copy_to(context.console.kept());
   OnConsole watcher(context.console);
-  std::unique_ptr<PageAlong> page;
+  std::shared_ptr<void> page;
   std::unique_ptr<OwnedChild> beside;
   const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<Farm>> {
     ASSIGN_OR_RETURN(page, open_page(options.page, store.run(), context));
