@@ -209,27 +209,23 @@ Status Outputs::write_in(const std::string& folder, const NamedTexts& files) con
 }
 
 void LongOptions::declare(CLI::App& app, Leaves leaves, bool remote) {
+  leaves_ = leaves;
   outputs.declare(app);
   if (leaves == Leaves::kFile) keep.declare(app);
   farm.declare(app, remote);
   declare_long_command(app);
 }
 
-Result<std::unique_ptr<Farm>> LongOptions::begin(const std::string& command, const std::string& out,
+Result<std::unique_ptr<Farm>> LongOptions::begin(const std::string& command,
                                                  std::vector<ProgressStage> stages,
                                                  const FarmSettings& settings,
                                                  CliContext& context) const {
-  LongCommand::begin_if_possible(command, keep.place(command, out), std::move(stages), context);
-  return start_recorded(farm, settings, context);
-}
-
-Result<std::unique_ptr<Farm>> LongOptions::begin_in(const std::string& command,
-                                                    const std::string& out,
-                                                    std::vector<ProgressStage> stages,
-                                                    const FarmSettings& settings,
-                                                    CliContext& context) const {
-  const KeepingPlace place{out, /*passing=*/false, /*forget=*/true};
-  RETURN_IF_ERROR(LongCommand::begin(command, place, std::move(stages), context));
+  if (leaves_ == Leaves::kFile) {
+    LongCommand::begin_if_possible(command, keep.place(command, out), std::move(stages), context);
+  } else {
+    const KeepingPlace place{out, /*passing=*/false, /*forget=*/true};
+    RETURN_IF_ERROR(LongCommand::begin(command, place, std::move(stages), context));
+  }
   return start_recorded(farm, settings, context);
 }
 
@@ -247,7 +243,18 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   ASSIGN_OR_RETURN(Config config, read_config(path));
   RETURN_IF_ERROR(check_can(config.problem.scenario, kTraces, path));
   to->seed = config.seed;
-  RETURN_IF_ERROR(choose(config.problem.commands, to));
+  const std::vector<CommandSpec>& known = config.problem.commands;
+  if (names.empty()) to->commands = known;
+  for (const std::string& name : names) {
+    const CommandSpec* found = find_by(known, name, &CommandSpec::name);
+    if (!found) {
+      return Error{"there is no command '" + name + "'" + suggestion(name, command_names(known))};
+    }
+    to->commands.push_back(*found);
+  }
+  if (to->commands.empty()) {
+    return Error{"the scenario has no commands whose paths could be traced"};
+  }
   if (config.problem.pieces.empty()) {
     if (trials.files.empty() && only.empty()) return config;
     return Error{path + ": scenario " + config.problem.scenario +
@@ -262,21 +269,6 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   }
   if (to->trials.empty()) return Error{path + ": the log has no push of the pieces asked for"};
   return config;
-}
-
-Status TracedCommands::choose(const std::vector<CommandSpec>& known, TraceSettings* to) const {
-  to->commands = known;
-  if (!names.empty()) to->commands.clear();
-  for (const std::string& name : names) {
-    const CommandSpec* found = find_by(known, name, &CommandSpec::name);
-    if (!found) {
-      return Error{"there is no command '" + name + "'" + suggestion(name, command_names(known))};
-    }
-    to->commands.push_back(*found);
-  }
-  if (to->commands.empty())
-    return Error{"the scenario has no commands whose paths could be traced"};
-  return {};
 }
 
 }  // namespace gapfarm

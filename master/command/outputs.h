@@ -69,6 +69,7 @@ class Outputs {
 
 // What most long commands take: --force, workers, and where to keep what is simulated.
 struct LongOptions {
+  std::string out;  // file or folder that the command leaves
   Outputs outputs;
   FarmOptions farm;
   KeepOption keep;
@@ -76,15 +77,13 @@ struct LongOptions {
   enum class Leaves { kFile, kFolder };  // a folder keeps by itself: without --keep
   void declare(CLI::App& app, Leaves leaves, bool remote);
 
-  // The command's work begins (LongCommand), in keep's place: the farm that it asks.
-  Result<std::unique_ptr<Farm>> begin(const std::string& command, const std::string& out,
-                                      std::vector<ProgressStage> stages,
+  // The command's work begins (LongCommand), in keep's place or in the folder `out`: the farm that
+  // it asks.  What is simulated goes at the end: paths are large, and no figure refers to them.
+  Result<std::unique_ptr<Farm>> begin(const std::string& command, std::vector<ProgressStage> stages,
                                       const FarmSettings& settings, CliContext& context) const;
-  // The same in the folder `out`, and what is simulated goes at the end: paths are large, and no
-  // figure refers to them.
-  Result<std::unique_ptr<Farm>> begin_in(const std::string& command, const std::string& out,
-                                         std::vector<ProgressStage> stages,
-                                         const FarmSettings& settings, CliContext& context) const;
+
+ private:
+  Leaves leaves_ = Leaves::kFile;
 };
 
 struct TracedCommands {
@@ -96,9 +95,6 @@ struct TracedCommands {
   // The config, and in `to` what of it is traced: its commands, or the pushes of a log where the
   // commands are pieces.  Errors: of reading either, a name that is no command, nothing to trace.
   Result<Config> open(const std::string& path, TraceSettings* to) const;
-
- private:
-  Status choose(const std::vector<CommandSpec>& known, TraceSettings* to) const;
 };
 
 }  // namespace gapfarm

@@ -18,7 +18,6 @@ inline constexpr const char* kDiagnosisFile = "diagnosis.json";
 struct DiagnoseCommand : LongOptions {
   std::string config;
   TrialOptions trials;
-  std::string out;
   std::string model;
   std::vector<std::string> reference;  // of ground robots: what changed since
   std::optional<RunLog> reference_log;

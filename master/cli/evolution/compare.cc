@@ -25,7 +25,6 @@ namespace {
 struct CompareCommand : LongOptions {
   std::vector<std::string> files;
   TrialOptions trials;
-  std::string out;
   std::optional<unsigned> seeds;
   std::optional<std::uint64_t> first_seed, evaluations;
   std::optional<double> target;

@@ -35,8 +35,9 @@ CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
     const auto filters = tokens_of(test);
     plan.tests.emplace_back(filters.begin(), filters.end());
   }
-  plan.tuning = {config.evolution, options.seed.value_or(config.seed)};
-  if (options.evaluations) plan.tuning.evolution.evaluations = *options.evaluations;
+  plan.evolution = config.evolution;
+  plan.seed = options.seed.value_or(config.seed);
+  if (options.evaluations) plan.evolution.evaluations = *options.evaluations;
   return plan;
 }
 

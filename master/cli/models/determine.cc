@@ -21,7 +21,7 @@ namespace gapfarm {
 namespace {
 
 struct DetermineCommand : LongOptions {
-  std::string config, model, out;
+  std::string config, model;
   TrialOptions trials;
   DetermineSettings settings;
 };
@@ -108,7 +108,7 @@ Result<int> run_determine(DetermineCommand& command, CliContext& context) {
         context);
   }
   ASSIGN_OR_RETURN(const auto asked,
-                   command.begin("determine", command.out, {{"evaluate"}}, config.farm, context));
+                   command.begin("determine", {{"evaluate"}}, config.farm, context));
   ASSIGN_OR_RETURN(const auto report,
                    determine(problem, point, farm_likelihood(*asked, problem, config.seed),
                              settings, context.work->hooks()));

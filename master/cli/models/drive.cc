@@ -30,7 +30,6 @@ struct DriveCommand : LongOptions {
   TrialOptions reading;
   std::string start = "0,0,0";
   std::string log;  // blendersim's
-  std::string out;
   unsigned runs = 200;
   double coverage = 0.9;
   DriveSettings settings;
@@ -100,96 +99,66 @@ Result<Task> read_task(const DriveCommand& command, const Model& model) {
   return task;
 }
 
-class Driving {
- public:
-  Driving(const DriveCommand& command, const Task& task, const Problem& problem, Farm& farm,
-          Console& console)
-      : command_(command), task_(task), problem_(problem), farm_(farm), console_(console) {
-    report_.coverage = command.coverage;
-    report_.real = task.real;
-    report_.targets = task.targets;
-  }
-
-  Result<DriveReport> run() {
-    ASSIGN_OR_RETURN(const auto nominal, nominal_velocities(farm_, problem_));
-    RETURN_IF_ERROR(simulate(nominal));
-    auto constant = nominal;
-    if (!command_.mined.empty()) {
-      ASSIGN_OR_RETURN(const auto log,
-                       read_trial_files(command_.mined, command_names(problem_.commands),
-                                        command_.reading.read));
-      show_notes(log, console_);
-      ASSIGN_OR_RETURN(constant, constant_velocities(log, problem_.commands));
-      ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, problem_.commands));
-      const auto mover = mined_mover(mined, command_.settings);
-      RETURN_IF_ERROR(add("mined motion model", drive(mover, constant, command_.runs), true));
+// How far the straight lines between the targets are from the real path.
+std::optional<RealDistances> targets_to_real(const Task& task) {
+  if (task.real.empty()) return std::nullopt;
+  std::vector<PathSample> lines = {{0, task.start}};
+  for (const Eigen::Vector2d& target : task.targets) {
+    const Pose from = lines.back().pose;
+    const double length = std::hypot(target.x() - from.x, target.y() - from.y);
+    const int steps = std::max(1, static_cast<int>(length / kSpacing_m));
+    for (int i = 1; i <= steps; ++i) {
+      const double share = static_cast<double>(i) / steps;
+      lines.push_back(
+          {0, {from.x + share * (target.x() - from.x), from.y + share * (target.y() - from.y), 0}});
     }
-    const auto mover = constant_velocity_mover(constant, command_.settings);
-    RETURN_IF_ERROR(add("constant velocity", drive(mover, constant, 2), false));
-    compare_targets();
-    return report_;
   }
+  const std::vector<DrivenRun> straight = {{Leg{{}, lines}}};
+  return distances_to(straight, task.real, 0);
+}
 
- private:
-  Status simulate(const std::vector<ConstantVelocity>& nominal) {
-    if (task_.targets.empty()) {
-      return add("simulation",
-                 drive_commands(farm_, problem_, task_.start, task_.commands, command_.runs,
-                                command_.settings),
-                 true);
-    }
-    const auto mover = simulated_mover(farm_, problem_, command_.settings);
-    return add("simulation", drive(mover, nominal, command_.runs), true);
-  }
-
-  // `rates`: what a pilot would have measured of the robot that the mover moves.
-  Result<std::vector<DrivenRun>> drive(const Mover& mover,
-                                       const std::vector<ConstantVelocity>& rates,
-                                       unsigned runs) const {
-    if (task_.targets.empty()) return drive_commands(mover, task_.start, task_.commands, runs);
-    ASSIGN_OR_RETURN(const auto pilot, make_pilot(rates));
-    return drive_waypoints(mover, pilot, task_.start, task_.targets, runs);
-  }
-
-  Status add(const std::string& name, Result<std::vector<DrivenRun>> runs, bool spread) {
-    if (!runs) return runs.error();
-    DriverReport driver;
+Result<DriveReport> drive_all(const DriveCommand& command, const Task& task, const Problem& problem,
+                              Farm& farm, Console& console) {
+  const DriveSettings& settings = command.settings;
+  DriveReport report{command.coverage, {}, task.real, task.targets, targets_to_real(task)};
+  const auto add = [&](const std::string& name, Result<std::vector<DrivenRun>> runs, bool spread) {
+    if (!runs) return Status(runs.error());
+    DriverReport& driver = report.drivers.emplace_back();
     driver.name = name;
     driver.runs = *std::move(runs);
-    driver.end = end_ellipse(driver.runs, command_.coverage);
-    if (spread) driver.band = path_band(driver.runs, command_.coverage);
-    if (!task_.real.empty()) {
-      driver.real = distances_to(driver.runs, task_.real, kSpacing_m);
-    }
-    report_.drivers.push_back(std::move(driver));
-    return {};
+    driver.end = end_ellipse(driver.runs, command.coverage);
+    if (spread) driver.band = path_band(driver.runs, command.coverage);
+    if (!task.real.empty()) driver.real = distances_to(driver.runs, task.real, kSpacing_m);
+    return Status();
+  };
+  // `rates`: what a pilot would have measured of the robot that the mover moves.
+  const auto drive = [&](const Mover& mover, const std::vector<ConstantVelocity>& rates,
+                         unsigned runs) -> Result<std::vector<DrivenRun>> {
+    if (task.targets.empty()) return drive_commands(mover, task.start, task.commands, runs);
+    ASSIGN_OR_RETURN(const auto pilot, make_pilot(rates));
+    return drive_waypoints(mover, pilot, task.start, task.targets, runs);
+  };
+  ASSIGN_OR_RETURN(auto constant, nominal_velocities(farm, problem));
+  RETURN_IF_ERROR(
+      add("simulation",
+          task.targets.empty()
+              ? drive_commands(farm, problem, task.start, task.commands, command.runs, settings)
+              : drive(simulated_mover(farm, problem, settings), constant, command.runs),
+          true));
+  if (!command.mined.empty()) {
+    ASSIGN_OR_RETURN(
+        const auto log,
+        read_trial_files(command.mined, command_names(problem.commands), command.reading.read));
+    show_notes(log, console);
+    ASSIGN_OR_RETURN(constant, constant_velocities(log, problem.commands));
+    ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, problem.commands));
+    const auto mover = mined_mover(mined, settings);
+    RETURN_IF_ERROR(add("mined motion model", drive(mover, constant, command.runs), true));
   }
-
-  void compare_targets() {
-    if (task_.real.empty()) return;
-    std::vector<PathSample> lines = {{0, task_.start}};
-    for (const Eigen::Vector2d& target : task_.targets) {
-      const Pose from = lines.back().pose;
-      const double length = std::hypot(target.x() - from.x, target.y() - from.y);
-      const int steps = std::max(1, static_cast<int>(length / kSpacing_m));
-      for (int i = 1; i <= steps; ++i) {
-        const double share = static_cast<double>(i) / steps;
-        lines.push_back(
-            {0,
-             {from.x + share * (target.x() - from.x), from.y + share * (target.y() - from.y), 0}});
-      }
-    }
-    const std::vector<DrivenRun> straight = {{Leg{{}, lines}}};
-    report_.real_to_targets = distances_to(straight, task_.real, 0);
-  }
-
-  const DriveCommand& command_;
-  const Task& task_;
-  const Problem& problem_;
-  Farm& farm_;
-  Console& console_;
-  DriveReport report_;
-};
+  const auto mover = constant_velocity_mover(constant, settings);
+  RETURN_IF_ERROR(add("constant velocity", drive(mover, constant, 2), false));
+  return report;
+}
 
 Json to_json(const DriveReport& report) {
   Json drivers = Json::array();
@@ -242,11 +211,9 @@ Result<int> run_drive(DriveCommand& command, CliContext& context) {
                          {{"out", command.out}, {"runs", command.runs}, {"simulations", tasks}},
                          command.farm, {}, context);
   }
-  ASSIGN_OR_RETURN(const auto asked,
-                   command.begin_in("drive", command.out, {{"drive", 1, tasks}}, {}, context));
+  ASSIGN_OR_RETURN(const auto asked, command.begin("drive", {{"drive", 1, tasks}}, {}, context));
   context.work->stage(0);
-  ASSIGN_OR_RETURN(const auto report,
-                   Driving(command, task, problem, *asked, context.console).run());
+  ASSIGN_OR_RETURN(const auto report, drive_all(command, task, problem, *asked, context.console));
   RETURN_IF_ERROR(command.outputs.write_in(
       command.out,
       {{kBand, band_csv(report)},

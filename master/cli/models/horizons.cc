@@ -21,7 +21,6 @@ struct HorizonsCommand : LongOptions {
   std::vector<std::string> runs;
   std::vector<double> horizons = {0.5, 2, 5, 0};
   std::string picture;
-  std::string out;
 };
 
 // Whole runs, before and after, as a picture.

@@ -17,7 +17,6 @@ namespace {
 
 struct InfluenceCommand : LongOptions {
   std::string config;
-  std::string out;
   std::string distance = "frechet";
   TracedCommands traced;
   InfluenceSettings settings;
@@ -58,8 +57,8 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
                          {{"out", command.out}, {"parameters", genes.size()}}, command.farm,
                          config.farm, context);
   }
-  ASSIGN_OR_RETURN(const auto asked, command.begin_in("influence", command.out, {{"trace paths"}},
-                                                      config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   command.begin("influence", {{"trace paths"}}, config.farm, context));
   ASSIGN_OR_RETURN(const auto report, find_influence(*asked, config.problem, genes,
                                                      command.settings, context.work->hooks()));
   RETURN_IF_ERROR(

@@ -27,7 +27,6 @@ struct PredictOptions : LongOptions {
   std::string model;
   std::vector<std::string> mined;
   TrialOptions trials;
-  std::string out = "-";
 };
 
 // The log in parts that many workers can have and a stop does not lose; trials of one command stay
@@ -65,8 +64,8 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
   // Any fitness will do; this one asks nothing of the log.
   problem.fitness.kind = FitnessKind::kLogScore;
   const std::vector<v1::Task> tasks = predict_tasks(log);
-  ASSIGN_OR_RETURN(const auto asked, options.begin("predict", options.out,
-                                                   {{"predict", 1, tasks.size()}}, {}, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   options.begin("predict", {{"predict", 1, tasks.size()}}, {}, context));
   context.work->stage(0);
   ASSIGN_OR_RETURN(const auto results, asked->run(asked->add_problem(to_proto(problem)), tasks));
   v1::PredictResult whole;
@@ -84,19 +83,14 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
   return predictions;
 }
 
-// Paths are those of the trials to predict.
-ReadOptions reading_of_mined(const PredictOptions& options) {
-  ReadOptions read = options.trials.read;
-  read.paths.clear();
-  return read;
-}
-
 Result<std::vector<PredictedTrial>> predict_by_log(const TrialLog& log,
                                                    const PredictOptions& options,
                                                    Console& console) {
   const std::vector<CommandSpec> commands = default_commands("srv1");
-  ASSIGN_OR_RETURN(const TrialLog mined, read_trial_files(options.mined, command_names(commands),
-                                                          reading_of_mined(options)));
+  ReadOptions reading = options.trials.read;
+  reading.paths.clear();  // they are those of the trials to predict
+  ASSIGN_OR_RETURN(const TrialLog mined,
+                   read_trial_files(options.mined, command_names(commands), reading));
   show_notes(mined, console);
   ASSIGN_OR_RETURN(const MotionModel model, MotionModel::mine(mined, commands));
   std::vector<PredictedTrial> predictions;
@@ -187,6 +181,7 @@ SubcommandRun setup_predict(CLI::App& app) {
   auto options = std::make_shared<PredictOptions>();
   app.add_option("RUN|MODEL", options->model, "Run folder or model.toml");
   options->trials.declare(app, "Trial logs to predict")->required();
+  options->out = "-";
   app.add_option("--out", options->out, "CSV to write; - for stdout");
   app.add_option(
       "--mined", options->mined,

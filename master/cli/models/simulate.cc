@@ -19,7 +19,6 @@ namespace {
 
 struct SimulateOptions : LongOptions {
   std::string source;
-  std::string out;
   std::string like;
   std::vector<std::string> set;
   std::optional<std::uint64_t> seed;
@@ -91,9 +90,8 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Source& source, Cl
 Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, const Plan& plan,
                           CliContext& context) {
   const Config& config = source.config;
-  ASSIGN_OR_RETURN(const auto asked,
-                   options.begin("simulate", options.out, {{"drive sessions", 1, plan.size()}},
-                                 config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked, options.begin("simulate", {{"drive sessions", 1, plan.size()}},
+                                                   config.farm, context));
   context.work->stage(0);
   const std::string hash = asked->add_problem(to_proto(without_log(config.problem)));
   ASSIGN_OR_RETURN(

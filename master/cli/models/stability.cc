@@ -18,7 +18,6 @@ namespace {
 
 struct StabilityCommand : LongOptions {
   std::string config;
-  std::string out;
   TracedCommands traced;
   StabilitySettings settings;
 };
@@ -65,8 +64,8 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
         {{"out", command.out}, {"genes", genes}, {"repeats", command.settings.repeats}},
         command.farm, config.farm, context);
   }
-  ASSIGN_OR_RETURN(const auto asked, command.begin_in("stability", command.out, {{"trace paths"}},
-                                                      config.farm, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   command.begin("stability", {{"trace paths"}}, config.farm, context));
   ASSIGN_OR_RETURN(const auto report,
                    find_stability(*asked, config.problem, command.settings, context.work->hooks()));
   RETURN_IF_ERROR(write_all(command, config, report));
