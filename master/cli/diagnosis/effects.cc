@@ -24,12 +24,8 @@ std::string value_text(const Parameter& p, double value) {
 }
 
 std::string range_text(const Parameter& p, bool strength) {
-  std::string text;
-  if (p.choices.empty()) {
-    text = fmt::format("{:.4g} to {:.4g}", p.lower, p.upper);
-  } else {
-    for (const std::string& choice : p.choices) text += (text.empty() ? "" : " or ") + choice;
-  }
+  const std::string text = p.choices.empty() ? fmt::format("{:.4g} to {:.4g}", p.lower, p.upper)
+                                             : joined(p.choices, " or ");
   return text + (strength ? ", neutral " : ", default ") + value_text(p, p.nominal);
 }
 

@@ -33,23 +33,6 @@
 namespace gapfarm {
 namespace {
 
-// Simulates on one worker of its own, which begins with the first question.  No run's farm is
-// asked.
-class DriveShower {
- public:
-  explicit DriveShower(CliContext& context) : context_(context) {}
-
-  // JSON for watch.js: paths of [t s, x m, y m, heading rad] from the start, by the config's values
-  // ("before") and by the best of the generation ("best"), both without noise.  Errors: no such
-  // trial or generation, a drive that does not end well.
-  Result<std::string> show(const DriveQuestion& question);
-
- private:
-  CliContext& context_;
-  std::unique_ptr<SocketFarm> farm_;
-  std::map<std::string, std::string> shown_;  // answers to what was asked
-};
-
 using Json = nlohmann::ordered_json;
 
 constexpr double kPlayedInterval_s = 0.02;
@@ -207,55 +190,71 @@ std::vector<PathSample> logged_window(const RunInfo& info, const Problem& proble
   return log ? measured_window(*log, window) : std::vector<PathSample>();
 }
 
-Result<std::string> DriveShower::show(const DriveQuestion& question) {
-  ASSIGN_OR_RETURN(const auto reader, RunReader::open(question.run));
-  ASSIGN_OR_RETURN(const auto problem, stored_problem(reader));
-  // Those that were evolved on, then those that were held out, where they can still be read.
-  const std::size_t logged = problem.log.trials.size();
-  const auto apart = question.trial < logged ? Result<std::optional<Problem>>(std::nullopt)
-                                             : held_out_of(reader.info(), problem);
-  const bool beyond = question.trial >= logged;
-  const std::size_t extra = apart && *apart ? (*apart)->log.trials.size() : 0;
-  if (beyond && question.trial - logged >= extra) {
-    return Error{fmt::format("the run has {} {}, those that it held out included, and no {}",
-                             logged + extra, problem.ground ? "windows" : "trials",
-                             question.trial + 1)};
+// Simulates on one worker of its own, which begins with the first question.  No run's farm is
+// asked.
+class DriveShower {
+ public:
+  explicit DriveShower(CliContext& context) : context_(context) {}
+
+  // JSON for watch.js: paths of [t s, x m, y m, heading rad] from the start, by the config's values
+  // ("before") and by the best of the generation ("best"), both without noise.  Errors: no such
+  // trial or generation, a drive that does not end well.
+  Result<std::string> show(const DriveQuestion& question) {
+    ASSIGN_OR_RETURN(const auto reader, RunReader::open(question.run));
+    ASSIGN_OR_RETURN(const auto problem, stored_problem(reader));
+    // Those that were evolved on, then those that were held out, where they can still be read.
+    const std::size_t logged = problem.log.trials.size();
+    const auto apart = question.trial < logged ? Result<std::optional<Problem>>(std::nullopt)
+                                               : held_out_of(reader.info(), problem);
+    const bool beyond = question.trial >= logged;
+    const std::size_t extra = apart && *apart ? (*apart)->log.trials.size() : 0;
+    if (beyond && question.trial - logged >= extra) {
+      return Error{fmt::format("the run has {} {}, those that it held out included, and no {}",
+                               logged + extra, problem.ground ? "windows" : "trials",
+                               question.trial + 1)};
+    }
+    ASSIGN_OR_RETURN(const auto best, best_of(reader, question.generation));
+    const std::string key =
+        fmt::format("{}|{}|{}|{}", question.run.string(), reader.info().problem_hash,
+                    question.trial, best.individual.birth_id);
+    if (const auto known = shown_.find(key); known != shown_.end()) return known->second;
+    if (!farm_) {
+      ASSIGN_OR_RETURN(farm_, start_farm({.workers = 1}, {}, context_));
+    }
+    const Problem& of = beyond ? **apart : problem;
+    const Trial& trial = of.log.trials[beyond ? question.trial - logged : question.trial];
+    ASSIGN_OR_RETURN(auto drive, of.ground
+                                     ? watch_window(*farm_, of, trial, best.individual.genome,
+                                                    logged_window(reader.info(), of, trial, beyond))
+                                     : watch_trial(*farm_, problem, trial, best.individual.genome));
+    Json json = {{"title", title_of(trial, question.trial + 1, of.ground != nullptr) +
+                               (beyond ? ", held out" : "")},
+                 {"held_out", beyond}};
+    json.update(drive.json);
+    json["said"] = fmt::format(
+        "Best: genome {} of generation {}, {} {}.{}", best.individual.birth_id, best.generation,
+        reader.info().fitness,
+        best.individual.fitness ? fmt::format("{:.6g}", *best.individual.fitness) : "unknown",
+        drive.failed);
+    json["note"] = fmt::format(
+        "{}{}",
+        beyond ? fmt::format("▲ Held out: evolution never saw this {}. ",
+                             of.ground ? "window" : "trial")
+               : "",
+        json["measured"].size() > 1 ? ""
+        : of.ground
+            ? "Faint: the log of the runs cannot be read (any more), an arc joins the start "
+              "to the measured end."
+            : "Faint: no path was measured, an arc joins the start to the measured end.");
+    if (shown_.size() >= kMostKept) shown_.clear();
+    return shown_[key] = json_text(json);
   }
-  ASSIGN_OR_RETURN(const auto best, best_of(reader, question.generation));
-  const std::string key =
-      fmt::format("{}|{}|{}|{}", question.run.string(), reader.info().problem_hash, question.trial,
-                  best.individual.birth_id);
-  if (const auto known = shown_.find(key); known != shown_.end()) return known->second;
-  if (!farm_) {
-    ASSIGN_OR_RETURN(farm_, start_farm({.workers = 1}, {}, context_));
-  }
-  const Problem& of = beyond ? **apart : problem;
-  const Trial& trial = of.log.trials[beyond ? question.trial - logged : question.trial];
-  ASSIGN_OR_RETURN(auto drive, of.ground
-                                   ? watch_window(*farm_, of, trial, best.individual.genome,
-                                                  logged_window(reader.info(), of, trial, beyond))
-                                   : watch_trial(*farm_, problem, trial, best.individual.genome));
-  Json json = {{"title", title_of(trial, question.trial + 1, of.ground != nullptr) +
-                             (beyond ? ", held out" : "")},
-               {"held_out", beyond}};
-  json.update(drive.json);
-  json["said"] = fmt::format(
-      "Best: genome {} of generation {}, {} {}.{}", best.individual.birth_id, best.generation,
-      reader.info().fitness,
-      best.individual.fitness ? fmt::format("{:.6g}", *best.individual.fitness) : "unknown",
-      drive.failed);
-  json["note"] = fmt::format(
-      "{}{}",
-      beyond
-          ? fmt::format("▲ Held out: evolution never saw this {}. ", of.ground ? "window" : "trial")
-          : "",
-      json["measured"].size() > 1 ? ""
-      : of.ground ? "Faint: the log of the runs cannot be read (any more), an arc joins the start "
-                    "to the measured end."
-                  : "Faint: no path was measured, an arc joins the start to the measured end.");
-  if (shown_.size() >= kMostKept) shown_.clear();
-  return shown_[key] = json_text(json);
-}
+
+ private:
+  CliContext& context_;
+  std::unique_ptr<SocketFarm> farm_;
+  std::map<std::string, std::string> shown_;  // answers to what was asked
+};
 
 constexpr int kPatience_ms = 500;
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -18,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// kSetting: PARAMETER=VALUE.  From kEffect on they are of the problem, those before of the disk.
 enum class Takes {
-  kNothing,
   kFile,
   kFolder,
   kConfig,
@@ -28,17 +29,12 @@ enum class Takes {
   kDiagnosis,
   kEffect,
   kParameter,
-  kSetting,  // PARAMETER=VALUE
-  kCommand,
+  kSetting,
+  kCommand
 };
 
 // "gapfarm COMMAND" is omitted: an option means the same everywhere.
-struct OptionTakes {
-  Takes takes;
-  std::vector<std::string_view> options;
-};
-
-const std::vector<OptionTakes> kOptionTakes = {
+const std::vector<std::pair<Takes, std::vector<std::string_view>>> kOptionTakes = {
     {Takes::kConfig, {"CONFIG", "CONFIG|MODEL", "--config", "--robot"}},
     {Takes::kRun, {"RUN", "RUN|DIAGNOSIS", "FOLDER", "--reference", "--run"}},
     {Takes::kModel,
@@ -57,22 +53,15 @@ const std::vector<OptionTakes> kOptionTakes = {
     {Takes::kCommand, {"--command", "--commands"}}};
 
 // Words that an option takes and no validator of its own lists.
-struct OptionChoices {
-  const char* option;
-  std::vector<std::string> arguments;
+const std::map<std::string, std::vector<std::string>> kOptionChoices = {
+    {"--genome", {"best"}},
+    {"--log-format", {"text", "json"}},
+    {"--log-level", {"debug", "info", "warn", "error", "off"}},
+    {"FORMAT", {"bbautotune", "runs"}},
+    {"--sizes", {"clear", "subtle"}},
+    {"--on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
+    {"--workers-on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
 };
-const std::vector<OptionChoices>& option_choices() {
-  static const std::vector<OptionChoices> kTable = {
-      {"--genome", {"best"}},
-      {"--log-format", {"text", "json"}},
-      {"--log-level", {"debug", "info", "warn", "error", "off"}},
-      {"FORMAT", {"bbautotune", "runs"}},
-      {"--sizes", {"clear", "subtle"}},
-      {"--on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
-      {"--workers-on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
-  };
-  return kTable;
-}
 
 std::string short_summary(const std::string& text) { return text.substr(0, text.find('\n')); }
 
@@ -195,23 +184,14 @@ std::vector<std::string> choices_of(const CLI::Option& option) {
 void add_values(const Place& place, const CLI::Option& option, const std::string& begun,
                 std::vector<CompletionCandidate>& found) {
   const std::string name = option.get_name(option.get_positional());
-  for (const OptionChoices& row : option_choices()) {
-    if (name != row.option) continue;
-    for (const std::string& word : row.arguments) found.push_back({word, ""});
-    return;
-  }
-  const std::vector<std::string> choices = choices_of(option);
+  const auto* listed = find_in(kOptionChoices, name);
+  const std::vector<std::string> choices = listed ? *listed : choices_of(option);
   for (const std::string& word : choices) found.push_back({word, ""});
   if (!choices.empty()) return;
-  for (const OptionTakes& row : kOptionTakes) {
-    if (!contains(row.options, name)) continue;
-    const bool of_problem = row.takes == Takes::kEffect || row.takes == Takes::kParameter ||
-                            row.takes == Takes::kSetting || row.takes == Takes::kCommand;
-    if (of_problem) {
-      add_problem_arguments(place, row.takes, begun, found);
-    } else {
-      add_paths(begun, row.takes, found);
-    }
+  for (const auto& [takes, options] : kOptionTakes) {
+    if (!contains(options, name)) continue;
+    takes >= Takes::kEffect ? add_problem_arguments(place, takes, begun, found)
+                            : add_paths(begun, takes, found);
   }
 }
 
@@ -231,8 +211,7 @@ std::vector<CompletionCandidate> completion_candidates(const CLI::App& app,
   const std::string begun = arguments.empty() ? "" : arguments.back();
   const Place place = find_place(app, arguments);
   std::vector<CompletionCandidate> found;
-  const bool option_begun = !begun.empty() && begun[0] == '-';
-  if (option_begun) {
+  if (begun.starts_with('-')) {
     add_options(*place.app, found);
   } else {
     if (place.option != nullptr) add_values(place, *place.option, begun, found);

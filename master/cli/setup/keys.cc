@@ -147,8 +147,9 @@ using KeysRun = Result<int> (*)(const KeysOptions&, CliContext&);
 SubcommandRun setup_keys(CLI::App& app) {
   auto options = std::make_shared<KeysOptions>();
   auto chosen = std::make_shared<KeysRun>(nullptr);
-  const auto add = [&](const char* name, const char* summary, KeysRun run) {
-    CLI::App* sub = app.add_subcommand(name, summary);
+  // A parent's examples are not its children's.
+  const auto add = [&](const char* name, const char* summary, KeysRun run, const char* examples) {
+    CLI::App* sub = app.add_subcommand(name, summary)->footer(examples);
     sub->add_option("--keys", options->folder, "Key folder (default: ~/.config/gapfarm/keys)")
         ->type_name("FOLDER");
     sub->callback([chosen, run] { *chosen = run; });
@@ -159,35 +160,33 @@ SubcommandRun setup_keys(CLI::App& app) {
         return is_key_name(text) ? "" : "'" + text + "' is not 1 to 64 of A-Z a-z 0-9 . _ -";
       },
       "NAME");
-  CLI::App* make = add("make", "make the keys of a master and of this machine's workers", run_make);
-  make->add_flag("--worker", options->worker_only, "Only those of this machine's workers");
-  make->add_option("--name", options->name, "The worker's name (default: the host's)")->check(name);
-  CLI::App* worker = add("worker", "make the key folder of another machine's workers", run_worker);
-  worker->add_option("NAME", options->name, "Of the worker")->required()->check(name);
-  worker->add_option("--out", options->out, "Folder to make")->required();
-  CLI::App* allow = add("allow", "let in a worker that has made its own key", run_allow);
-  allow->add_option("NAME", options->name, "Of the worker")->required()->check(name);
-  allow->add_option("FILE", options->file, "Public key file");
-  allow->add_option("--key", options->key, "The public key itself (40 characters)");
-  CLI::App* revoke = add("revoke", "let a worker in no more", run_revoke);
-  revoke->add_option("NAME", options->name, "Of the worker")->required()->check(name);
-  CLI::App* list = add("list", "show public keys and who is let in", run_list);
-  // A parent's examples are not its children's.
-  make->footer(
+  const auto add_name = [&](CLI::App* sub) {
+    sub->add_option("NAME", options->name, "Of the worker")->required()->check(name);
+  };
+  CLI::App* make = add(
+      "make", "make the keys of a master and of this machine's workers", run_make,
       "Examples:\n"
       "  gapfarm keys make                       # once, for master and local workers\n"
       "  gapfarm keys make --worker --name rack4 # on rack4, to be let in by `gapfarm keys allow`");
-  worker->footer(
-      "Examples:\n"
-      "  gapfarm keys worker rack3 --out /tmp/rack3   # then copy the folder to rack3");
-  allow->footer(
-      "Examples:\n"
-      "  gapfarm keys allow rack4 rack4.pub\n"
-      "  gapfarm keys allow rack4 --key KEY");
-  revoke->footer(
-      "Examples:\n"
-      "  gapfarm keys revoke rack4");
-  list->footer(
+  make->add_flag("--worker", options->worker_only, "Only those of this machine's workers");
+  make->add_option("--name", options->name, "The worker's name (default: the host's)")->check(name);
+  CLI::App* worker =
+      add("worker", "make the key folder of another machine's workers", run_worker,
+          "Examples:\n"
+          "  gapfarm keys worker rack3 --out /tmp/rack3   # then copy the folder to rack3");
+  add_name(worker);
+  worker->add_option("--out", options->out, "Folder to make")->required();
+  CLI::App* allow = add("allow", "let in a worker that has made its own key", run_allow,
+                        "Examples:\n"
+                        "  gapfarm keys allow rack4 rack4.pub\n"
+                        "  gapfarm keys allow rack4 --key KEY");
+  add_name(allow);
+  allow->add_option("FILE", options->file, "Public key file");
+  allow->add_option("--key", options->key, "The public key itself (40 characters)");
+  add_name(add("revoke", "let a worker in no more", run_revoke,
+               "Examples:\n"
+               "  gapfarm keys revoke rack4"));
+  add("list", "show public keys and who is let in", run_list,
       "Examples:\n"
       "  gapfarm keys list\n"
       "  gapfarm keys list --json | jq .[].name");
