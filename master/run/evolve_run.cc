@@ -294,20 +294,6 @@ StoredGeneration stored_generation(const GenerationRecord& record, const Problem
   return stored;
 }
 
-// What a run begins with, read before any farm is there.
-struct RunInputs {
-  std::optional<Checkpoint> checkpoint;
-  StagePlan plan;
-  std::optional<Problem> held_out;
-};
-
-Result<RunInputs> read_inputs(const RunStore& store, const Config& config) {
-  ASSIGN_OR_RETURN(auto checkpoint, store.checkpoint());
-  ASSIGN_OR_RETURN(auto plan, read_stages(config));
-  ASSIGN_OR_RETURN(auto held_out, read_validation(plan, config));
-  return RunInputs{std::move(checkpoint), std::move(plan), std::move(held_out)};
-}
-
 // What a run without a best to leave has to say.
 std::string without_best(const EvolveSummary& evolved) {
   if (!evolved.best || evolved.best->standing.outcome == v1::OK) return {};
@@ -333,24 +319,28 @@ Error stopped_by(RunStore& store, Error error, const Progress& last) {
 }
 
 Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWatcher& watcher) {
-  const auto inputs = read_inputs(store, request.config);
-  if (!inputs) return stopped_by(store, inputs.error());
+  const auto checkpoint = store.checkpoint();
+  if (!checkpoint) return stopped_by(store, checkpoint.error());
+  const auto plan = read_stages(request.config);
+  if (!plan) return stopped_by(store, plan.error());
+  const auto held_out = read_validation(*plan, request.config);
+  if (!held_out) return stopped_by(store, held_out.error());
   EvolveOptions options;
   options.settings = request.config.evolution;
   options.fitness = request.problem.fitness.kind;
-  options.spent_s = inputs->checkpoint ? inputs->checkpoint->wall_s : 0;
+  options.spent_s = *checkpoint ? (*checkpoint)->wall_s : 0;
   options.began_s = monotonic_seconds();
   FarmEventKeeper events(store, watcher);
   auto farm = request.open_farm([&](const FarmEvent& event) { events.keep(event); });
   if (!farm) return stopped_by(store, farm.error());
-  auto optimiser = optimiser_of(request, inputs->plan, inputs->checkpoint, **farm, watcher);
+  auto optimiser = optimiser_of(request, *plan, *checkpoint, **farm, watcher);
   if (!optimiser) {
     events.flush();
     Progress last;
     last.farm = (*farm)->tally();
     return stopped_by(store, optimiser.error(), last);
   }
-  ProgressWriter progress(store, **farm, request, inputs->checkpoint,
+  ProgressWriter progress(store, **farm, request, *checkpoint,
                           options.spent_s + monotonic_seconds() - *options.began_s, events,
                           watcher);
   std::uint64_t given_up = 0;  // by this master's farm, in the generations that are committed
@@ -377,7 +367,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));
   if (summary.stopped()) return summary;
   if (summary.evolved.best && summary.evolved.best->standing.outcome == v1::OK) {
-    const Status left = write_outputs(store, request, inputs->held_out, **farm, watcher, &summary);
+    const Status left = write_outputs(store, request, *held_out, **farm, watcher, &summary);
     // Finished is what has its model; resumed, it only leaves that behind.
     if (!left) return stopped_by(store, left.error(), progress.now());
   }

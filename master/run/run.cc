@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "common/base/clock.h"
 #include "common/base/ranges.h"
 #include "common/trials/read.h"
 #include "master/evolve/islands.h"
@@ -37,6 +36,42 @@ Status find_start(const RunRequest& run, Farm& farm, RunWatcher& watcher, Optimi
   setup->nominal = std::move(start.genome);
   setup->spread = std::move(start.spread);
   return {};
+}
+
+// Of trials that the model was fitted to.  A baseline has a handful of numbers a command: fitted to
+// the trials that it is scored on it would look better than it is.
+constexpr const char* kFromOthers =
+    "learned from the other sessions or parts of the log (the model has seen all of it)";
+
+bool same_trials(const TrialLog& a, const TrialLog& b) {
+  const auto same = [](const Trial& s, const Trial& t) {
+    return s.session == t.session && s.trial == t.trial && s.command == t.command &&
+           s.X_WS.x == t.X_WS.x && s.X_WE.x == t.X_WE.x && s.X_WE.y == t.X_WE.y;
+  };
+  return std::equal(a.trials.begin(), a.trials.end(), b.trials.begin(), b.trials.end(), same);
+}
+
+std::string note(const std::vector<BaselineComparison>& baselines, const std::string& how) {
+  const std::string sentence = baseline_sentence(baselines, "the model");
+  return sentence.empty() ? sentence : "without a simulation, " + how + ": " + sentence;
+}
+
+// Whether a scenario's commands can repeat, so that there is something to learn from repeats.
+bool has_baselines(std::string_view scenario) {
+  const ScenarioForm& form = scenario_form(scenario);
+  return !form.pieces && form.commands().size() > 1;
+}
+
+// The trials that a model was fitted to, where its files are still at hand and hold as many.
+std::optional<TrialLog> trials_behind(const Model& model) {
+  std::error_code code;
+  for (const std::string& file : model.data.files) {
+    if (!std::filesystem::is_regular_file(file, code)) return std::nullopt;
+  }
+  if (model.data.files.empty()) return std::nullopt;
+  auto log = read_trial_files(model.data.files, command_names(model.commands));
+  if (!log || log->trials.size() != model.data.trials) return std::nullopt;
+  return *std::move(log);
 }
 
 }  // namespace
@@ -105,9 +140,7 @@ Status check_runnable(const Config& config) {
   OptimiserSetup setup;
   setup.settings = config.evolution;
   setup.genes = config.problem.genes;
-  if (const auto islands = island_count(setup); !islands) {
-    return Error{config.path + ": " + islands.error().message};
-  }
+  RETURN_IF_ERROR(under(config.path, island_count(setup)));
   ASSIGN_OR_RETURN(const auto plan, read_stages(config));
   const auto log = read_validation(plan, config);
   return log ? Status() : Status(log.error());
@@ -133,46 +166,6 @@ Result<std::vector<ScoreRow>> validate(const RunStore& store, const Problem& apa
   return rows;
 }
 
-namespace {
-
-// Of trials that the model was fitted to.  A baseline has a handful of numbers a command: fitted to
-// the trials that it is scored on it would look better than it is.
-constexpr const char* kFromOthers =
-    "learned from the other sessions or parts of the log (the model has seen all of it)";
-
-bool same_trials(const TrialLog& a, const TrialLog& b) {
-  const auto same = [](const Trial& s, const Trial& t) {
-    return s.session == t.session && s.trial == t.trial && s.command == t.command &&
-           s.X_WS.x == t.X_WS.x && s.X_WE.x == t.X_WE.x && s.X_WE.y == t.X_WE.y;
-  };
-  return std::equal(a.trials.begin(), a.trials.end(), b.trials.begin(), b.trials.end(), same);
-}
-
-std::string note(const std::vector<BaselineComparison>& baselines, const std::string& how) {
-  const std::string sentence = baseline_sentence(baselines, "the model");
-  return sentence.empty() ? sentence : "without a simulation, " + how + ": " + sentence;
-}
-
-// Whether a scenario's commands can repeat, so that there is something to learn from repeats.
-bool has_baselines(std::string_view scenario) {
-  const ScenarioForm& form = scenario_form(scenario);
-  return !form.pieces && form.commands().size() > 1;
-}
-
-// The trials that a model was fitted to, where its files are still at hand and hold as many.
-std::optional<TrialLog> trials_behind(const Model& model) {
-  std::error_code code;
-  for (const std::string& file : model.data.files) {
-    if (!std::filesystem::is_regular_file(file, code)) return std::nullopt;
-  }
-  if (model.data.files.empty()) return std::nullopt;
-  auto log = read_trial_files(model.data.files, command_names(model.commands));
-  if (!log || log->trials.size() != model.data.trials) return std::nullopt;
-  return *std::move(log);
-}
-
-}  // namespace
-
 Result<std::string> baseline_note(const Model& model, const TrialLog& log,
                                   std::span<const double> scores) {
   if (!has_baselines(model.scenario) || log.trials.empty()) return std::string();
@@ -187,12 +180,7 @@ Result<std::string> baseline_note(const Model& model, const TrialLog& log,
               behind ? kFromOthers : "learned from the other sessions of this log");
 }
 
-Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& genome, Farm& farm) {
-  if (!has_baselines(problem.scenario) || problem.log.trials.empty()) return std::string();
-  ASSIGN_OR_RETURN(const auto results,
-                   farm.run(farm.add_problem(to_proto(problem)), {prediction_task(genome, false)}));
-  if (results.front().outcome() != v1::OK) return std::string();
-  ASSIGN_OR_RETURN(const auto beside, baselines_beside(problem, results.front().predict()));
+std::string baseline_note_of_run(const std::vector<BaselineComparison>& beside) {
   return note(beside, kFromOthers);
 }
 

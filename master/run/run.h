@@ -95,12 +95,11 @@ Error stopped_by(RunStore& store, Error error, const Progress& last = {});
 Result<std::string> baseline_note(const Model& model, const TrialLog& log,
                                   std::span<const double> scores);
 
-// Beside the log scores that the problem's own trials have at a genome, each baseline learned from
-// the other sessions; empty also where the genome's simulation does not end well.
-Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& genome, Farm& farm);
-
-// The same beside a prediction of the problem's trials; none where baselines make no sense.
+// Beside a prediction of the problem's trials, each baseline learned from the other sessions; none
+// where baselines make no sense.
 Result<std::vector<BaselineComparison>> baselines_beside(const Problem& problem,
                                                          const v1::PredictResult& prediction);
+// The same as a sentence; empty where there are none.
+std::string baseline_note_of_run(const std::vector<BaselineComparison>& beside);
 
 }  // namespace gapfarm

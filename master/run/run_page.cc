@@ -11,8 +11,6 @@
 
 #include "common/base/hash.h"
 #include "common/base/text.h"
-#include "common/config/config.h"
-#include "common/config/model.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "common/trials/files.h"
@@ -105,10 +103,6 @@ std::string action(const RunReport& report, const RunInfo& info) {
          " --out DIAGNOSIS";
 }
 
-std::string program_text(const Problem& problem) {
-  return fmt::format("{}", fmt::join(problem.external->command.argv, " "));
-}
-
 std::string headline(const RunReport& report) {
   if (report.generations.empty()) return "No generation was completed yet.";
   const RunGeneration& last = report.generations.back();
@@ -164,8 +158,9 @@ std::vector<ScoreRow> baseline_rows(const std::vector<BaselineComparison>& compa
   return rows;
 }
 
-Status write_poses(RunStore& store, const Problem& problem, const Genome& best, Farm& farm,
-                   const std::vector<ScoreRow>& validated) {
+// Gives what to say of the best beside no simulation.
+Result<std::string> write_poses(RunStore& store, const Problem& problem, const Genome& best,
+                                Farm& farm, const std::vector<ScoreRow>& validated) {
   // As the config had them, and as evolved.
   ASSIGN_OR_RETURN(const auto results,
                    farm.run(farm.add_problem(to_proto(problem)),
@@ -179,17 +174,20 @@ Status write_poses(RunStore& store, const Problem& problem, const Genome& best, 
     known[i] = &predictions.emplace_back(PredictionOfLog{labels[i], results[i].predict()});
   }
   RunOutcome outcome = run_outcome(problem, known[0], known[1], validated);
+  std::vector<BaselineComparison> beside;
   if (known[1] != nullptr) {
-    ASSIGN_OR_RETURN(const auto beside, baselines_beside(problem, known[1]->prediction));
+    ASSIGN_OR_RETURN(beside, baselines_beside(problem, known[1]->prediction));
     outcome.baselines = baseline_rows(beside);
   }
   RETURN_IF_ERROR(store.keep_document(kOutcomeDocument, to_json(outcome)));
   const std::string title =
       fmt::format("End poses of {} trials, measured and simulated", problem.log.trials.size());
-  return write_file_atomically((store.run() / "poses.svg").string(),
-                               pose_picture(pose_panels(problem, predictions), title,
-                                            "Seen from the start, before and after evolution; "
-                                            "ellipses hold 90 % of the simulated positions"));
+  RETURN_IF_ERROR(
+      write_file_atomically((store.run() / "poses.svg").string(),
+                            pose_picture(pose_panels(problem, predictions), title,
+                                         "Seen from the start, before and after evolution; "
+                                         "ellipses hold 90 % of the simulated positions")));
+  return baseline_note_of_run(beside);
 }
 
 // In place of the one that the run left when it last ended; one that it did not leave is kept.
@@ -310,7 +308,8 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
   report.provenance = {
       {"config", info.config_path},
       report.objective
-          ? std::pair<std::string, std::string>("objective", program_text(problem))
+          ? std::pair<std::string, std::string>("objective",
+                                                joined(problem.external->command.argv, " "))
           : std::pair<std::string, std::string>("trials", std::to_string(report.trials)),
       {"problem", info.problem_hash},
       {"seed", std::to_string(info.seed)},
@@ -343,11 +342,11 @@ Status write_outputs(RunStore& store, const RunRequest& run, const std::optional
     summary->held_out = held_out->log.trials.size();
   }
   RETURN_IF_ERROR(replace_model(store, model_of(store, run, summary->evolved), watcher));
+  std::string beside;
   if (!is_value(problem.fitness.kind)) {
-    RETURN_IF_ERROR(write_poses(store, problem, best, farm, summary->validated));
+    ASSIGN_OR_RETURN(beside, write_poses(store, problem, best, farm, summary->validated));
   }
   RETURN_IF_ERROR(write_pages(store, watcher));
-  ASSIGN_OR_RETURN(const auto beside, baseline_note_of_run(problem, best, farm));
   if (!beside.empty()) watcher.note(beside);
   summary->files = mapped(output_files(problem),
                           [&](const std::string& name) { return (store.run() / name).string(); });

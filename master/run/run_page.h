@@ -1,19 +1,11 @@
 // A run's page, from its store alone.
 #pragma once
 
-#include <vector>
-
-#include "common/base/result.h"
-#include "common/config/settings.h"
-#include "common/problem/problem.h"
-#include "master/evolve/evolve.h"
 #include "master/farm/farm.h"
 #include "master/report/figures/figures.h"
-#include "master/report/run/run_report.h"
 #include "master/run/run.h"
 #include "master/store/records.h"
 #include "master/store/run_reader.h"
-#include "master/store/run_store.h"
 
 namespace gapfarm {
 

@@ -99,11 +99,7 @@ Result<Problem> stored_problem(const RunInfo& info) {
 }
 
 Result<Problem> stored_problem(const RunReader& run) {
-  auto problem = stored_problem(run.info());
-  if (problem) return problem;
-  Error error = problem.error();
-  error.message = run.run().string() + ": " + error.message;
-  return error;
+  return under(run.run().string(), stored_problem(run.info()));
 }
 
 Result<Config> parse_stored(const RunInfo& info, const Problem& problem) {
