@@ -3,20 +3,14 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <filesystem>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
-#include "common/config/config.h"
 #include "common/json/fields.h"
-#include "common/problem/problem.h"
 #include "common/score/baselines.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 
 namespace gapfarm {
@@ -135,16 +129,6 @@ std::vector<std::pair<std::string, std::string>> provenance(const CompareCommand
   return rows;
 }
 
-Status write_all(const CompareCommand& command, const Inputs& inputs,
-                 const ComparisonSummary& summary, const std::vector<ComparedRun>& runs) {
-  return command.outputs.write_in(
-      command.out,
-      {{kFiles[0], summary_csv(summary)},
-       {kFiles[1], runs_csv(summary, runs)},
-       {kFiles[2], convergence_csv(summary)},
-       {kFiles[3], comparison_page(summary, "Searches compared", provenance(command, inputs))}});
-}
-
 constexpr auto kBaseline = [](auto& v, const Baseline& row) { FIELDS(name, fitness); };
 constexpr auto kVariant = [](auto& v, const VariantSummary& row) {
   FIELDS(name, median);
@@ -188,8 +172,7 @@ Result<int> run_compare(CompareCommand& command, CliContext& context) {
   context.work->stage(
       0, 1 + inputs.options.evaluations * inputs.options.seeds * inputs.variants.size());
   ASSIGN_OR_RETURN(const auto as_written, untuned(*asked, first.problem));
-  ASSIGN_OR_RETURN(const auto runs,
-                   compare(inputs.variants, inputs.options, farm_scorer(*asked, inputs.variants)));
+  ASSIGN_OR_RETURN(const auto runs, compare(*asked, inputs.variants, inputs.options));
   ComparisonSummary summary =
       summarise_comparison(inputs.variants, runs, inputs.options, inputs.target);
   summary.baselines = {as_written};
@@ -201,7 +184,12 @@ Result<int> run_compare(CompareCommand& command, CliContext& context) {
         summary.baselines.begin(),
         {"constant velocity", constant ? std::optional(*constant) : std::nullopt});
   }
-  RETURN_IF_ERROR(write_all(command, inputs, summary, runs));
+  const std::string page =
+      comparison_page(summary, "Searches compared", provenance(command, inputs));
+  RETURN_IF_ERROR(command.outputs.write_in(command.out, {{kFiles[0], summary_csv(summary)},
+                                                         {kFiles[1], runs_csv(summary, runs)},
+                                                         {kFiles[2], convergence_csv(summary)},
+                                                         {kFiles[3], page}}));
   context.console.result(comparison_text(summary), FieldWriter::written(summary, kSummary));
   context.console.note("wrote: " + (std::filesystem::path(command.out) / "compare.html").string() +
                        ", summary.csv, runs.csv, convergence.csv");

@@ -85,67 +85,49 @@ class Lane {
 
 }  // namespace
 
-Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
-                                         const CompareOptions& options,
-                                         const CompareScorer& scorer) {
+Result<std::vector<ComparedRun>> compare(Farm& farm, std::span<const Variant> variants,
+                                         const CompareOptions& options) {
   std::vector<Lane> lanes;
+  std::vector<std::string> hashes;
   for (std::size_t v = 0; v < variants.size(); ++v) {
+    hashes.push_back(farm.add_problem(to_proto(variants[v].config.problem)));
     for (unsigned s = 0; s < options.seeds; ++s) {
       ASSIGN_OR_RETURN(auto lane,
                        Lane::create(variants[v], v, options.first_seed + s, options.evaluations));
       lanes.push_back(std::move(lane));
     }
   }
+  struct Round {
+    std::vector<v1::Task> tasks;
+    std::vector<std::size_t> lanes;  // of each
+  };
   for (;;) {
-    std::vector<CompareRequest> requests;
-    std::vector<std::size_t> asked(lanes.size());  // requests a lane
+    std::map<std::string, Round> rounds;  // by problem, which variants may share
     for (std::size_t i = 0; i < lanes.size(); ++i) {
       if (lanes[i].done()) continue;
-      const std::vector<Candidate> candidates = lanes[i].ask();
-      for (const Candidate& candidate : candidates) {
-        requests.push_back({lanes[i].run.variant, lanes[i].run.seed, candidate});
+      Round& round = rounds[hashes[lanes[i].run.variant]];
+      for (const Candidate& candidate : lanes[i].ask()) {
+        round.tasks.push_back(evaluation_task(candidate, lanes[i].run.seed));
+        round.lanes.push_back(i);
       }
-      asked[i] = candidates.size();
     }
-    if (requests.empty()) break;
-    ASSIGN_OR_RETURN(const auto scores, scorer(requests));
-    if (scores.size() != requests.size()) {
-      return Error{"asked for " + std::to_string(requests.size()) + " scores, but got " +
-                   std::to_string(scores.size())};
+    std::vector<std::vector<Score>> scores(lanes.size());
+    for (const auto& [hash, round] : rounds) {
+      if (round.tasks.empty()) continue;
+      ASSIGN_OR_RETURN(const auto results, farm.run(hash, round.tasks));
+      for (std::size_t k = 0; k < results.size(); ++k) {
+        const std::size_t i = round.lanes[k];
+        const Problem& problem = variants[lanes[i].run.variant].config.problem;
+        ASSIGN_OR_RETURN(const Score score, score_of(results[k], problem.fitness));
+        scores[i].push_back(score);
+      }
     }
-    std::span<const Score> rest = scores;
+    if (std::ranges::all_of(scores, &std::vector<Score>::empty)) break;
     for (std::size_t i = 0; i < lanes.size(); ++i) {
-      if (asked[i] > 0) lanes[i].tell(rest.first(asked[i]));
-      rest = rest.subspan(asked[i]);
+      if (!scores[i].empty()) lanes[i].tell(scores[i]);
     }
   }
   return mapped(lanes, [](Lane& lane) { return std::move(lane.run); });
-}
-
-CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
-  const auto hashes = mapped(variants, [&](const Variant& variant) {
-    return farm.add_problem(to_proto(variant.config.problem));
-  });
-  const auto fitness = mapped(variants, [](auto& v) { return v.config.problem.fitness; });
-  return [&farm, hashes,
-          fitness](std::span<const CompareRequest> requests) -> Result<std::vector<Score>> {
-    std::map<std::string, std::vector<std::size_t>> by_problem;
-    for (std::size_t i = 0; i < requests.size(); ++i) {
-      by_problem[hashes[requests[i].variant]].push_back(i);
-    }
-    std::vector<Score> scores(requests.size());
-    for (const auto& [hash, members] : by_problem) {
-      std::vector<v1::Task> tasks = mapped(members, [&](const std::size_t i) {
-        return evaluation_task(requests[i].candidate, requests[i].seed);
-      });
-      ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
-      const FitnessSettings& settings = fitness[requests[members.front()].variant];
-      for (std::size_t k = 0; k < members.size(); ++k) {
-        ASSIGN_OR_RETURN(scores[members[k]], score_of(results[k], settings));
-      }
-    }
-    return scores;
-  };
 }
 
 void name_apart(std::vector<Variant>& variants) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,27 +33,14 @@ struct ComparedRun {
   std::uint64_t evaluations = 0;          // made; fewer than asked when nothing new was left
 };
 
-// Scores candidates of one variant under one seed, in their order.
-struct CompareRequest {
-  std::size_t variant = 0;
-  std::uint64_t seed = 0;
-  Candidate candidate;
-};
-using CompareScorer =
-    std::function<Result<std::vector<Score>>(std::span<const CompareRequest> requests)>;
-
 // Variants of one name get their config's path instead; those of one path are numbered.
 void name_apart(std::vector<Variant>& variants);
 
 // Runs all of them in step, so that a farm always has work.  Every run of a variant is the run that
-// `evolve` would make with that seed, but for its stop conditions.   Errors: of the
-// optimisers' setup and of the scorer.
-Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
-                                         const CompareOptions& options,
-                                         const CompareScorer& scorer);
-
-// The farm as a scorer.  `farm` outlives it.
-CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants);
+// `evolve` would make with that seed, but for its stop conditions.  Errors: of the optimisers'
+// setup and of the farm.
+Result<std::vector<ComparedRun>> compare(Farm& farm, std::span<const Variant> variants,
+                                         const CompareOptions& options);
 
 // What a comparison's runs say: convergence, success, ranks.
 

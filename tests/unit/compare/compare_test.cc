@@ -10,6 +10,7 @@
 #include "common/config/config.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
+#include "tests/immediate_farm.h"
 #include "tests/temporary_folder.h"
 
 namespace gapfarm::compare_test {
@@ -28,14 +29,29 @@ Variant variant(const std::string& name, const std::string& more) {
 }
 
 // Least, 0, in the middle of the box.
-Result<std::vector<Score>> sphere_scores(std::span<const CompareRequest> requests) {
-  std::vector<Score> scores;
-  for (const CompareRequest& request : requests) {
-    double cost = 0;
-    for (const double g : request.candidate.genome) cost += (g - 0.5) * (g - 0.5);
-    scores.push_back({v1::OK, cost});
+template <class Genes>
+double sphere(const Genes& genes) {
+  double cost = 0;
+  for (const double g : genes) cost += (g - 0.5) * (g - 0.5);
+  return cost;
+}
+
+class SphereFarm : public tests::ImmediateFarm {
+ public:
+  std::string add_problem(const v1::Problem& problem) override { return problem_hash(problem); }
+
+ private:
+  Result<v1::TaskResult> answer_task(const std::string&, const v1::Task& task) override {
+    v1::TaskResult result;
+    result.set_outcome(v1::OK);
+    result.mutable_evaluate()->set_fitness(sphere(task.evaluate().point().genome()));
+    return result;
   }
-  return scores;
+};
+
+std::vector<ComparedRun> run_all(std::span<const Variant> variants, const CompareOptions& options) {
+  SphereFarm farm;
+  return compare(farm, variants, options).value();
 }
 
 TEST(Compare, GivesEveryRunTheSameEvaluations) {
@@ -45,10 +61,9 @@ TEST(Compare, GivesEveryRunTheSameEvaluations) {
   CompareOptions options;
   options.seeds = 3;
   options.evaluations = 157;
-  const auto runs = compare(variants, options, sphere_scores);
-  ASSERT_TRUE(runs.ok());
-  ASSERT_THAT(*runs, SizeIs(9));
-  for (const ComparedRun& run : *runs) {
+  const auto runs = run_all(variants, options);
+  ASSERT_THAT(runs, SizeIs(9));
+  for (const ComparedRun& run : runs) {
     EXPECT_EQ(run.evaluations, 157U);
     EXPECT_LE(run.improvements.back().evaluations, 157U);
     for (std::size_t i = 1; i < run.improvements.size(); ++i) {
@@ -65,15 +80,15 @@ TEST(Compare, RunsAreThoseOfEvolve) {
   CompareOptions options;
   options.seeds = 2;
   options.evaluations = 200;
-  const auto runs = compare(variants, options, sphere_scores).value();
+  const auto runs = run_all(variants, options);
   for (const ComparedRun& run : runs) {
     const Config& config = variants[run.variant].config;
     auto alone =
         make_optimiser(optimiser_setup(config.evolution, config.problem, run.seed)).value();
     while (alone->evaluations() < 200) {
-      std::vector<CompareRequest> requests;
-      for (const Candidate& c : alone->ask()) requests.push_back({run.variant, run.seed, c});
-      alone->tell(sphere_scores(requests).value());
+      alone->tell(mapped(alone->ask(), [](const Candidate& c) {
+        return Score{v1::OK, sphere(c.genome)};
+      }));
     }
     EXPECT_LE(alone->best().standing.cost, run.improvements.back().fitness);
     EXPECT_NEAR(alone->best().standing.cost, run.improvements.back().fitness, 1e-2);
@@ -97,7 +112,7 @@ TEST(Compare, ASpaceWithoutAnythingNewEndsARun) {
                              .value()};
   CompareOptions options;
   options.seeds = 1;
-  const auto runs = compare(std::vector{small}, options, sphere_scores).value();
+  const auto runs = run_all(std::vector{small}, options);
   EXPECT_EQ(runs.front().evaluations, 3U);
 }
 
