@@ -8,7 +8,6 @@
 #include "common/math/statistics.h"
 #include "common/trials/files.h"
 #include "common/trials/write.h"
-#include "master/experiments/blind_check/cases/seal.h"
 #include "master/experiments/crossfit/crossfit.h"
 #include "master/farm/planned_trials.h"
 
@@ -194,8 +193,7 @@ Status diagnose_blindly(const InHand& hand, const std::vector<Truth>& truths,
   // A file that only its owner can read.
   RETURN_IF_ERROR(write_file_atomically(paths.stopped_truths(), format_sealed(hand.sealed),
                                         IfThere::kReplace, 0600));
-  if (hooks.note)
-    hooks.note("the truths are in " + paths.stopped_truths() + " until the check goes on");
+  hooks.note("the truths are in " + paths.stopped_truths() + " until the check goes on");
   return diagnosed;
 }
 
@@ -222,12 +220,8 @@ Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettin
                                           ? take_up(paths)
                                           : make_cases(config, settings, hooks, paths));
   ASSIGN_OR_RETURN(const auto truths, truths_of(hand));
-  if (hooks.note) {
-    hooks.note(std::to_string(truths.size()) + " cases sealed, see " + paths.seals());
-  }
-  if (hooks.on_sealed) {
-    RETURN_IF_ERROR(hooks.on_sealed());
-  }
+  hooks.note(std::to_string(truths.size()) + " cases sealed, see " + paths.seals());
+  RETURN_IF_ERROR(hooks.on_sealed());
   RETURN_IF_ERROR(diagnose_blindly(hand, truths, settings, hooks, paths));
   RETURN_IF_ERROR(open_truths(hand, paths));
   BlindReport report{settings.provenance, {}, hand.out_of_reach};

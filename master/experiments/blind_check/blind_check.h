@@ -12,19 +12,10 @@
 // the last diagnosis process has ended, and taken away again when it goes on.
 #pragma once
 
-#include <functional>
 #include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
-#include "common/base/result.h"
-#include "common/process/stop.h"
 #include "common/progress/overall_progress.h"
-#include "master/diagnose/result/diagnosis.h"
-#include "master/experiments/blind_check/cases/design.h"
 #include "master/experiments/blind_check/tally.h"
-#include "master/farm/farm.h"
 
 namespace gapfarm {
 
@@ -33,11 +24,11 @@ struct BlindCheckHooks {
   std::function<Result<std::unique_ptr<Farm>>()> start_farm;
   // Of find strengths, drive the cases, diagnose, judge; the farm's work shows how far it is.
   StageHooks stages = {};
-  std::function<void(std::size_t ended, std::size_t all)> diagnosed;  // cases; may be empty
-  std::function<void(const std::string& sentence)> note;
+  std::function<void(std::size_t ended, std::size_t all)> diagnosed =  // cases
+      [](std::size_t, std::size_t) {};
+  std::function<void(const std::string& sentence)> note = [](const std::string&) {};
   // Before the first diagnosis, with the truths sealed: whatever else would reveal them has to go.
-  // May be empty.
-  std::function<Status()> on_sealed;
+  std::function<Status()> on_sealed = [] { return Status(); };
   StopSource* stop = nullptr;  // not owned
 };
 

@@ -11,7 +11,6 @@
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "common/base/clock.h"
 #include "common/json/fields.h"
@@ -21,8 +20,6 @@
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/experiments/blind_check/blind_check.h"
-#include "master/experiments/blind_check/tally.h"
-#include "master/farm/farm.h"
 
 namespace gapfarm {
 namespace {
@@ -109,7 +106,7 @@ class Crowd {
       kill(-child.pid, SIGKILL);
       ++ended;
       const ChildEnd end = end_of(child, status, used, options_);
-      if (options_.on_end) options_.on_end(*child.job, end);
+      options_.on_end(*child.job, end);
     }
     return ended;
   }
@@ -130,35 +127,6 @@ class Crowd {
   const ChildrenOptions& options_;
   std::vector<Child> children_;
 };
-
-}  // namespace
-
-const char* child_state_name(ChildState state) {
-  static constexpr const char* kNames[] = {"done", "failed", "crashed", "timeout"};
-  return kNames[static_cast<std::size_t>(state)];
-}
-
-Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& options) {
-  Crowd crowd(options);
-  std::size_t started = 0;
-  std::size_t ended = 0;
-  while (ended < jobs.size()) {
-    if (options.stop && options.stop->requested()) return stop_requested();
-    while (started < jobs.size() && crowd.size() < std::max(1u, options.at_once)) {
-      ASSIGN_OR_RETURN(const Child child, start_job(jobs[started]));
-      crowd.add(child);
-      ++started;
-    }
-    pollfd stop = {options.stop ? options.stop->fd() : -1, POLLIN, 0};
-    poll(&stop, 1, kTick_ms);
-    ended += crowd.reap();
-    crowd.enforce_limit();
-    if (options.on_tick) options.on_tick(ended);
-  }
-  return {};
-}
-
-namespace {
 
 constexpr auto kOutOfReach = [](auto& v, auto& row) { FIELDS(effect, level, size); };
 constexpr auto kCheckState = [](auto& v, auto& row) {
@@ -214,6 +182,31 @@ Status make_empty(const std::string& folder) {
 
 }  // namespace
 
+const char* child_state_name(ChildState state) {
+  static constexpr const char* kNames[] = {"done", "failed", "crashed", "timeout"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
+Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& options) {
+  Crowd crowd(options);
+  std::size_t started = 0;
+  std::size_t ended = 0;
+  while (ended < jobs.size()) {
+    if (options.stop && options.stop->requested()) return stop_requested();
+    while (started < jobs.size() && crowd.size() < std::max(1u, options.at_once)) {
+      ASSIGN_OR_RETURN(const Child child, start_job(jobs[started]));
+      crowd.add(child);
+      ++started;
+    }
+    pollfd stop = {options.stop ? options.stop->fd() : -1, POLLIN, 0};
+    poll(&stop, 1, kTick_ms);
+    ended += crowd.reap();
+    crowd.enforce_limit();
+    options.on_tick(ended);
+  }
+  return {};
+}
+
 Status write_check_state(const CheckState& state, const std::string& path) {
   Json json = {{"version", 1}};
   json.update(FieldWriter::written(state, kCheckState));
@@ -239,7 +232,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
     jobs.push_back({id, diagnose_command(cases[i], i + 1, paths, settings),
                     paths.diagnosis(id) + "/output.txt"});
   }
-  if (jobs.size() < cases.size() && hooks.note) {
+  if (jobs.size() < cases.size()) {
     hooks.note(std::to_string(cases.size() - jobs.size()) + " cases are diagnosed already");
   }
   hooks.stages.began(2);
@@ -252,13 +245,11 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
   options.done = [](int status) { return status == 0 || status == 3; };
   options.on_end = [&](const ChildJob& job, const ChildEnd& end) {
     if (Status s = write_outcome(end, paths.outcome(job.id)); !s) written = s;
-    if (end.state != ChildState::kDone && hooks.note) {
+    if (end.state != ChildState::kDone) {
       hooks.note(job.id + ": the diagnosis " + end.text + "; see " + job.log_path);
     }
   };
-  options.on_tick = [&](std::size_t ended) {
-    if (hooks.diagnosed) hooks.diagnosed(ended, jobs.size());
-  };
+  options.on_tick = [&](std::size_t ended) { hooks.diagnosed(ended, jobs.size()); };
   RETURN_IF_ERROR(run_children(jobs, options));
   return written;
 }

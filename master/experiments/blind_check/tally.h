@@ -2,20 +2,12 @@
 #pragma once
 
 #include <functional>
-#include <map>
-#include <optional>
-#include <string>
 #include <utility>
-#include <vector>
 
-#include "common/base/result.h"
-#include "common/config/settings.h"
 #include "common/process/stop.h"
 #include "common/residual/field.h"
 #include "master/diagnose/result/diagnosis.h"
 #include "master/experiments/blind_check/cases/design.h"
-#include "master/experiments/blind_check/cases/seal.h"
-#include "master/farm/farm.h"
 
 namespace gapfarm {
 
@@ -45,7 +37,7 @@ struct ChildrenOptions {
   // Exit statuses that count as done.
   std::function<bool(int status)> done = [](int status) { return status == 0; };
   std::function<void(const ChildJob& job, const ChildEnd& end)> on_end;
-  std::function<void(std::size_t ended)> on_tick;  // now and then
+  std::function<void(std::size_t ended)> on_tick = [](std::size_t) {};  // now and then
 };
 
 // Runs all jobs in order; returns when the last has ended.  Every child leads a process group of

@@ -182,7 +182,7 @@ TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
 
   StopSource fresh_stop;
   hooks_.stop = &fresh_stop;
-  hooks_.diagnosed = nullptr;
+  hooks_.diagnosed = [](std::size_t, std::size_t) {};
   settings_.asked = "this";
   const auto resumed = run();
   ASSERT_TRUE(resumed.ok()) << resumed.error().message;

@@ -107,13 +107,6 @@ void draft_cases(const DesignSettings& settings, const std::vector<std::size_t>&
   }
 }
 
-void add_overrides(const ParameterTable& table, std::size_t effect,
-                   const std::vector<double>& values, v1::Point& point) {
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    *point.add_overrides() = override_of(table.effect_row(effect) + i, values[i]);
-  }
-}
-
 // Predictions of some of the planned trials by the robot of `truth`.
 v1::Task predict_task(const Problem& planned, const Truth& truth) {
   v1::Task task = prediction_task(overrides_of(planned.table(), truth), false);
@@ -158,8 +151,11 @@ Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm) {
       const Sizing& s = drafts.sizings[i];
       if (s.search.done()) continue;
       v1::Task task = predict_task(planned, drafts.cases[s.in_case]);
-      add_overrides(table, s.effect, effect_values(table, s.draw, s.search.strength()),
-                    *task.mutable_predict()->mutable_point());
+      const auto values = effect_values(table, s.draw, s.search.strength());
+      for (std::size_t k = 0; k < values.size(); ++k) {
+        *task.mutable_predict()->mutable_point()->add_overrides() =
+            override_of(table.effect_row(s.effect) + k, values[k]);
+      }
       task.mutable_predict()->set_means_only(table.effects()[s.effect].moves_means());
       open.push_back(i);
       round.push_back(std::move(task));

@@ -1,11 +1,6 @@
 // The design of a blind check: which cases, with which robots and which strengths of which effects.
 #pragma once
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
-#include "common/base/result.h"
 #include "common/config/settings.h"
 #include "master/experiments/blind_check/cases/seal.h"
 #include "master/experiments/blind_check/cases/sizing.h"

@@ -45,6 +45,28 @@ Error wrong(const std::string& file, const std::string& what) {
           "\"none\", \"effect\" or \"unknown\""};
 }
 
+constexpr std::size_t kSaltBytes = 16;
+constexpr std::size_t kSealBytes = 32;
+
+void start_sodium() {
+  const int ready = sodium_init();
+  assert(ready >= 0);
+  (void)ready;
+}
+
+std::string hex(const unsigned char* bytes, std::size_t size) {
+  std::string text(2 * size + 1, '\0');
+  sodium_bin2hex(text.data(), text.size(), bytes, size);
+  text.pop_back();
+  return text;
+}
+
+const unsigned char* raw(std::string_view text) {
+  return reinterpret_cast<const unsigned char*>(text.data());
+}
+
+constexpr auto kSealed = [](auto& v, auto& row) { FIELDS(id, salt, truth); };
+
 }  // namespace
 
 const Effect* catalogue_entry(const std::string& name) {
@@ -117,30 +139,6 @@ Result<Truth> parse_truth(const std::string& text, const std::string& file, cons
   return truth;
 }
 
-namespace {
-
-constexpr std::size_t kSaltBytes = 16;
-constexpr std::size_t kSealBytes = 32;
-
-void start_sodium() {
-  const int ready = sodium_init();
-  assert(ready >= 0);
-  (void)ready;
-}
-
-std::string hex(const unsigned char* bytes, std::size_t size) {
-  std::string text(2 * size + 1, '\0');
-  sodium_bin2hex(text.data(), text.size(), bytes, size);
-  text.pop_back();
-  return text;
-}
-
-const unsigned char* raw(std::string_view text) {
-  return reinterpret_cast<const unsigned char*>(text.data());
-}
-
-}  // namespace
-
 std::string random_salt() {
   start_sodium();
   unsigned char bytes[kSaltBytes];
@@ -183,12 +181,6 @@ Status verify_seals(const std::vector<SealedTruth>& truths, std::string_view sea
   if (published.empty()) return {};
   return Error{file + ": the truth of " + published.begin()->first + " is missing"};
 }
-
-namespace {
-
-constexpr auto kSealed = [](auto& v, auto& row) { FIELDS(id, salt, truth); };
-
-}  // namespace
 
 std::string format_sealed(const std::vector<SealedTruth>& truths) {
   return json_text(FieldWriter::list(truths, kSealed), 1) + "\n";
