@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include "common/base/hash.h"
+#include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/trials/files.h"
 
@@ -35,12 +37,11 @@ std::string listed_names(const Json& about) {
 
 // Names of the options that differ.
 std::string differing(const Json& a, const Json& b) {
-  std::string names;
+  std::vector<std::string> names;
   for (const auto& [key, value] : b.items()) {
-    if (a.contains(key) && a[key] == value) continue;
-    names += (names.empty() ? "" : ", ") + key;
+    if (!a.contains(key) || a[key] != value) names.push_back(key);
   }
-  return names.empty() ? "options" : names;
+  return names.empty() ? "options" : joined(names);
 }
 
 }  // namespace
@@ -75,6 +76,19 @@ Result<FolderState> compare_stamp(const std::string& folder, const std::string& 
                  " by another build of gapfarm; choose another --out, or --force to replace it"};
   }
   return FolderState::kSame;
+}
+
+std::string log_hash(const RunLog& log) {
+  Hasher hasher;
+  for (const LoggedRun& run : log.runs) {
+    hasher.add(run.session).add(run.run);
+    add_rows(run.commands, &hasher);
+    add_rows(run.wheel_speeds, &hasher);
+    for (const PoseRow& row : run.poses) {
+      hasher.add(row.t_s).add(row.X_WM.x).add(row.X_WM.y).add(row.X_WM.theta);
+    }
+  }
+  return hasher.finish();
 }
 
 }  // namespace gapfarm

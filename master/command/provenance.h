@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "common/recordings/run.h"
 
 namespace gapfarm {
 
@@ -31,6 +32,9 @@ Result<FolderState> compare_stamp(const std::string& folder, const std::string& 
                                   const Provenance& stamp, bool force);
 
 std::string format_stamp(const Provenance& stamp);
+
+// Of all that was recorded.
+std::string log_hash(const RunLog& log);
 
 inline constexpr const char* kStampFile = "question.json";
 

@@ -94,7 +94,7 @@ Look look(const GapPart& part, int effect) {
   switch (part.kind) {
     case GapPart::Kind::kFloor:
       return {"floor", "F"};
-    case GapPart::Kind::kUnexplained:
+    case GapPart::Kind::kUnnamed:
       return {"unexplained", "?"};
     case GapPart::Kind::kEffect:
       break;
@@ -124,8 +124,7 @@ std::vector<Stretch> stretches(const GapSplit& split, bool before) {
   for (const GapPart& part : split.parts) {
     const bool is_effect = part.kind == GapPart::Kind::kEffect;
     if (is_effect) ++effect;
-    const double amount =
-        part.kind == GapPart::Kind::kUnexplained ? part.amount - worse : part.amount;
+    const double amount = part.kind == GapPart::Kind::kUnnamed ? part.amount - worse : part.amount;
     const Look own = look(part, effect);
     if (!is_effect || before) list.push_back({above_zero(amount), own, part.label});
     if (is_effect && !before) {
@@ -278,7 +277,7 @@ GapSplit split_gap(const Diagnosis& diagnosis, GapUnit unit) {
   const GapFigures& f = diagnosis.*row_of(unit).figures;
   GapSplit split{unit, f.tuned, f.final_, {}};
   split.parts.push_back({GapPart::Kind::kFloor, "floor (repeats of a trial)", f.floor});
-  split.parts.push_back({GapPart::Kind::kUnexplained, "unexplained", f.final_ - f.floor});
+  split.parts.push_back({GapPart::Kind::kUnnamed, "unexplained", f.final_ - f.floor});
   const auto& effects = diagnosis.effects;
   if (effects.empty()) {
     split.parts[1].amount = f.tuned - f.floor;

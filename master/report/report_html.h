@@ -19,7 +19,7 @@ std::string report_html(const Diagnosis& diagnosis, bool served = false);
 enum class GapUnit { kNats, kMillimetres, kMilliradians };
 
 struct GapPart {
-  enum class Kind { kFloor, kUnexplained, kEffect };
+  enum class Kind { kFloor, kUnnamed, kEffect };
   Kind kind = Kind::kFloor;
   std::string label;
   // In the split's unit.  Negative when adding the effect made held-out trials worse, which

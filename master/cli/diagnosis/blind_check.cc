@@ -2,18 +2,13 @@
 #include "master/experiments/blind_check/blind_check.h"
 
 #include <algorithm>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
-#include "common/config/config.h"
 #include "common/process/process_pool.h"
-#include "common/trials/read.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/farm/planned_trials.h"
 
@@ -74,17 +69,13 @@ FarmOptions all_workers(const BlindCheckOptions& options) {
   return {.workers = static_cast<int>(diagnose.workers * diagnose.jobs)};
 }
 
-Result<std::unique_ptr<Farm>> start(const BlindCheckOptions& options, const Config& config,
-                                    CliContext& context) {
-  ASSIGN_OR_RETURN(auto started, start_farm(all_workers(options), config.farm, context));
-  return context.work->over(std::move(started));
-}
-
 BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
                          CliContext& context) {
   BlindCheckHooks hooks;
   hooks.stop = &context.stop;
-  hooks.start_farm = [&options, &config, &context] { return start(options, config, context); };
+  hooks.start_farm = [&options, &config, &context] {
+    return start_recorded(all_workers(options), config.farm, context);
+  };
   hooks.note = [&context](const std::string& sentence) { context.console.note(sentence); };
   hooks.stages = context.work->hooks();
   hooks.diagnosed = [&context](std::size_t ended, std::size_t all) {

@@ -3,25 +3,42 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/json/json.h"
-#include "master/cli/diagnosis/diagnose_command.h"
+#include "common/robot/robot.h"
+#include "common/trials/files.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/command/page_along.h"
 #include "master/command/provenance.h"
 #include "master/diagnose/result/diagnosis_json.h"
+#include "master/ground/diagnose_ground.h"
+#include "master/ground/fit/fit_file.h"
+#include "master/ground/fit/window_fit.h"
+#include "master/ground/program_runs.h"
 #include "master/report/report_html.h"
 
 namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kDiagnosisFile = "diagnosis.json";
+constexpr const char* kAnswers = "simulations.sqlite";
+constexpr const char* kFits = "fits.jsonl";
+
+struct DiagnoseCommand : LongOptions {
+  std::string config;
+  TrialOptions trials;
+  std::string model;
+  std::vector<std::string> reference;  // of ground robots: what changed since
+  std::optional<RunLog> reference_log;
+  std::vector<std::string> exclude;
+  std::optional<std::uint64_t> seed;
+  PageOption page;
+};
 
 void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& command,
                               Diagnosis* diagnosis) {
@@ -39,8 +56,6 @@ void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& comma
   to.emplace_back("program", build_summary("gapfarm"));
   to.emplace_back("seed", std::to_string(config.seed));
 }
-
-namespace {
 
 std::string diagnosis_summary(const Diagnosis& d) {
   std::string text = d.headline + "\n  " + d.action + "\n";
@@ -86,30 +101,21 @@ std::string diagnosis_summary(const Diagnosis& d) {
   return text;
 }
 
-// diagnosis.json without its trials.
-Json diagnosis_summary_json(const Diagnosis& diagnosis, const DiagnoseCommand& command) {
-  auto json = parse_json(to_json(diagnosis));
-  json.erase("trials");
-  json["out"] = command.out;
-  return json;
-}
-
-}  // namespace
-
+// Leaves `files`, report.html and diagnosis.json, and shows what was found.  `left`: of the files,
+// for people.
 Status leave_diagnosis(const DiagnoseCommand& command, const Diagnosis& diagnosis,
                        Outputs::NamedTexts files, const std::string& left, Console& console) {
   files.emplace_back("report.html", report_html(diagnosis));
   // Last: whoever sees it sees the rest.
   files.emplace_back(kDiagnosisFile, to_json(diagnosis));
   RETURN_IF_ERROR(command.outputs.write_in(command.out, files));
-  console.result(diagnosis_summary(diagnosis), diagnosis_summary_json(diagnosis, command));
+  Json json = parse_json(to_json(diagnosis));
+  json.erase("trials");
+  json["out"] = command.out;
+  console.result(diagnosis_summary(diagnosis), json);
   console.note("wrote: " + command.out + "/report.html, diagnosis.json, " + left);
   return {};
 }
-
-namespace {
-
-constexpr const char* kAnswers = "simulations.sqlite";
 
 Model model_of(const Config& config, const DiagnosisResult& result, const ParameterValues& values,
                const std::string& kind) {
@@ -124,12 +130,11 @@ Model model_of(const Config& config, const DiagnosisResult& result, const Parame
 
 Status write_models(const Config& config, const DiagnoseCommand& command,
                     const DiagnosisResult& result) {
-  const std::filesystem::path out(command.out);
+  const fs::path out(command.out);
   if (result.diagnosis.verdict == Verdict::kUnusable) {
     // Those of a diagnosis that this one replaces are not of it.
     std::error_code ignored;
-    for (const char* name : {"model.toml", "tuned.toml"})
-      std::filesystem::remove(out / name, ignored);
+    for (const char* name : {"model.toml", "tuned.toml"}) fs::remove(out / name, ignored);
     return {};
   }
   Model model = model_of(config, result, result.final_, "diagnosed");
@@ -179,16 +184,10 @@ Status plan_outputs(DiagnoseCommand& command, const Config& config, const Proven
     names = {kStampFile, "model.toml", "report.html", kDiagnosisFile};
   }
   for (const char* name : names) {
-    const std::string path = (std::filesystem::path(command.out) / name).string();
+    const std::string path = (fs::path(command.out) / name).string();
     RETURN_IF_ERROR(state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path));
   }
   return {};
-}
-
-std::vector<ProgressStage> diagnosis_stages() {
-  return mapped(kDiagnosisStages, [](const DiagnosisStage& stage) -> ProgressStage {
-    return {stage.name, stage.share};
-  });
 }
 
 // What the command line says of the problem, on top of the config.
@@ -209,6 +208,111 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
   config.problem.genes.clear();
   config.problem.fitness.kind = FitnessKind::kLogScore;
   return {};
+}
+
+// The folders of a log, or those that a run's model was fitted to.
+Result<std::vector<std::string>> reference_folders(const std::vector<std::string>& named,
+                                                   Console& console) {
+  std::vector<std::string> folders;
+  for (const std::string& name : named) {
+    if (is_there(fs::path(name) / "commands.csv")) {
+      folders.push_back(name);
+      continue;
+    }
+    const auto model = read_model_of(name, console);
+    if (!model) {
+      return Error{"--reference " + name + ": neither a folder with commands.csv and poses.csv " +
+                   "nor a run or model (" + model.error().message + ")"};
+    }
+    for (const std::string& folder : model->data.files) {
+      if (is_there(fs::path(folder) / "commands.csv")) {
+        folders.push_back(folder);
+        continue;
+      }
+      return Error{"--reference " + name + ": the log that it was fitted to, " + folder +
+                   ", is not there; name its folder instead"};
+    }
+  }
+  return folders;
+}
+
+// Reads the log that --reference names, if it does.  Errors: the scenario is not of ground robots;
+// a model whose log is gone.
+Status read_reference(DiagnoseCommand* command, const Config& config, Console& console) {
+  if (command->reference.empty()) return {};
+  if (!config.problem.ground) {
+    return Error{"--reference: asks what changed of a ground robot, but the scenario is " +
+                 config.problem.scenario + "; diagnose both logs, or use crossfit"};
+  }
+  ASSIGN_OR_RETURN(const auto folders, reference_folders(command->reference, console));
+  ASSIGN_OR_RETURN(
+      command->reference_log,
+      under("--reference", read_run_folders(folders, config.problem.ground->robot().channels)));
+  for (const std::string& note : command->reference_log->notes) console.note("reference: " + note);
+  return {};
+}
+
+// A ground robot: its file and its runs, by its kinematics, and nothing is simulated; or runs that
+// a program follows, which is asked for every motion.  `searched`: the config's genes; `stamp`: the
+// text of question.json.
+Result<int> run_diagnose_runs(DiagnoseCommand& command, const Config& config,
+                              const std::vector<Gene>& searched, const std::string& stamp,
+                              CliContext& context) {
+  const bool kinematic = config.problem.ground != nullptr;
+  Problem problem = config.problem;
+  ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, problem.channels()));
+  if (command.reference_log && log_hash(*command.reference_log) == log_hash(runs)) {
+    return Error{"--reference: found the log that is diagnosed, expected an earlier one"};
+  }
+  context.begun = true;
+  RETURN_IF_ERROR(LongCommand::begin(
+      "diagnose", {command.out}, {std::begin(kGroundStages), std::end(kGroundStages)}, context));
+  ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
+  const fs::path out(command.out);
+  RETURN_IF_ERROR(command.outputs.write((out / kStampFile).string(), stamp));
+  LongCommand& work = *context.work;
+  GroundDiagnoseOptions options;
+  options.excluded = command.exclude;
+  options.seed = config.seed;
+  options.windows.run_in_s = config.windows.run_in_s;
+  options.reference = command.reference_log;
+  options.on_stage = [&](const std::string& stage) { work.stage(stage); };
+  options.on_finding = [&](Finding finding) { work.found(std::move(finding)); };
+  options.on_progress = [&](std::size_t done, std::size_t total) { work.advance(done, total); };
+  options.stopped = [&] { return context.stop.requested(); };
+  std::optional<FitFile> fits;
+  Outputs::NamedTexts files;
+  std::string left;
+  std::optional<GroundDiagnosis> result;
+  if (kinematic) {
+    const GroundRobot robot = problem.ground->robot_at(problem.values);
+    fits.emplace(out / kFits);
+    work.keeps_also("fitted", out / kFits);
+    options.memo = &*fits;
+    ASSIGN_OR_RETURN(result, diagnose_ground(robot, runs, options));
+    files = {{"robot.toml", format_robot(result->corrected)},
+             {"values.json", format_values({robot, config.trial_files, result->values,
+                                            fs::current_path().string()})}};
+    left = "robot.toml with what was named put in; next: gapfarm export ros " + command.out;
+  } else {
+    ASSIGN_OR_RETURN(const auto farm, start_recorded(command.farm, config.farm, context));
+    const std::vector<Gene> tuned = command.model.empty() ? searched : std::vector<Gene>();
+    ASSIGN_OR_RETURN(result, diagnose_program_runs(*farm, tuned, runs, options, &problem));
+    Model model = model_of_problem(problem, problem.values);
+    model.kind = "diagnosed";
+    model.data = {problem_hash(to_proto(config.problem)), problem.log.trials.size(),
+                  config.trial_files};
+    files = {{"model.toml", format_model(model)}};
+    left = "model.toml with what was tuned and named put in";
+  }
+  add_diagnosis_provenance(config, command, &result->diagnosis);
+  for (const std::string& name : command.reference) {
+    result->diagnosis.provenance.emplace_back("reference", name);
+  }
+  RETURN_IF_ERROR(leave_diagnosis(command, result->diagnosis, std::move(files), "and " + left,
+                                  context.console));
+  if (fits) fits->remove();
+  return kExitDone;
 }
 
 Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
@@ -233,13 +337,15 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
     return run_diagnose_runs(command, config, options.genes, format_stamp(stamp), context);
   }
   // Every simulation goes into the folder: what a figure rests on can be looked up.
-  RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, diagnosis_stages(), context));
+  const auto stage_of = [](const DiagnosisStage& s) { return ProgressStage{s.name, s.share}; };
+  RETURN_IF_ERROR(
+      LongCommand::begin("diagnose", {command.out}, mapped(kDiagnosisStages, stage_of), context));
   ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
   ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
   options.keep_base = !command.model.empty();
   options.excluded = command.exclude;
   options.seed = config.seed;
-  const std::string stamp_file = (std::filesystem::path(command.out) / kStampFile).string();
+  const std::string stamp_file = (fs::path(command.out) / kStampFile).string();
   RETURN_IF_ERROR(command.outputs.write(stamp_file, format_stamp(stamp)));
   LongCommand& work = *context.work;
   options.on_stage = [&](const std::string& stage) { work.stage(stage); };

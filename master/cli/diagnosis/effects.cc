@@ -1,11 +1,9 @@
 // gapfarm effects: the catalogue.
 #include <spdlog/fmt/fmt.h>
 
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/config/config.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/experiments/blind_check/cases/sizing.h"

@@ -1,21 +1,14 @@
 // gapfarm plan CONFIG|MODEL: what to drive so that a diagnosis sees most.
 #include <spdlog/fmt/fmt.h>
 
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/trials/text/csv.h"
-#include "common/trials/trial.h"
 #include "common/trials/write.h"
 #include "master/cli/diagnosis/plan_drive.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
-#include "master/command/outputs.h"
 #include "master/diagnose/conclusions/findings.h"
-#include "master/experiments/plan/design.h"
 
 namespace gapfarm {
 namespace {
@@ -129,14 +122,6 @@ Json table_json(const plan::DesignedPlan& plan) {
           {"without_shift", plan.without_shift}};
 }
 
-Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& config,
-                                  CliContext& context) {
-  ASSIGN_OR_RETURN(const auto asked,
-                   options.begin("plan", {{"candidates", 10, 0}, {"what they show", 3, 0}},
-                                 config.farm, context));
-  return plan::design_plan(*asked, config, options.settings, context.work->hooks());
-}
-
 Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& context) {
   ASSIGN_OR_RETURN(Source source, read_source(options.source));
   const bool of_drive = source.config.problem.ground != nullptr;
@@ -162,7 +147,11 @@ Result<int> run_plan(PlanOptions& options, const CLI::App& app, CliContext& cont
                          {{"out", options.out}, {"trials", options.settings.trials}}, options.farm,
                          source.config.farm, context);
   }
-  ASSIGN_OR_RETURN(const auto plan, design(options, source.config, context));
+  ASSIGN_OR_RETURN(const auto asked,
+                   options.begin("plan", {{"candidates", 10, 0}, {"what they show", 3, 0}},
+                                 source.config.farm, context));
+  ASSIGN_OR_RETURN(const auto plan, plan::design_plan(*asked, source.config, options.settings,
+                                                      context.work->hooks()));
   ASSIGN_OR_RETURN(const auto files,
                    trial_files(shifted(plan.log, source.frame_x_m, source.frame_y_m), options.out));
   for (const TrialFile& file : files) {

@@ -6,15 +6,11 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <utility>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/parameters/ground.h"
-#include "common/problem/problem.h"
 #include "common/trials/text/csv.h"
-#include "master/command/inputs.h"
 #include "master/io/logs/column_map.h"
 #include "master/report/figures/figures.h"
 

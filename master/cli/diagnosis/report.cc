@@ -1,9 +1,6 @@
 // gapfarm report RUN|DIAGNOSIS: the page of a run or of a diagnosis, from what they keep alone.
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/text.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"

@@ -3,20 +3,16 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/hash.h"
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/problem/problem.h"
 #include "common/robot/robot.h"
 #include "common/trials/files.h"
-#include "master/cli/diagnosis/diagnose_command.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
+#include "master/command/provenance.h"
 #include "master/ground/fit/fit_file.h"
 #include "master/ground/fit/wheel_loop.h"
 #include "master/ground/watch/changes.h"
@@ -161,7 +157,7 @@ void read_logs(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
 Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, CliContext& context,
                 WatchedFleet* fleet) {
   RunCache cache(cache_file);
-  const bool by_wheels = std::all_of(robots->begin(), robots->end(), [](const RobotFolder& robot) {
+  const bool by_wheels = std::ranges::all_of(*robots, [](const RobotFolder& robot) {
     return std::ranges::all_of(
         robot.runs, [&](const RunFolder& run) { return has_wheel_speeds(robot.robot, run.log); });
   });
