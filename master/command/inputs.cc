@@ -1,7 +1,6 @@
 #include "master/command/inputs.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -9,7 +8,6 @@
 #include <thread>
 
 #include "common/base/build_info.h"
-#include "common/base/text.h"
 #include "common/trials/files.h"
 #include "master/command/long_command.h"
 #include "master/ground/diagnose_ground.h"
@@ -26,6 +24,23 @@ LogLevel level_of(FarmEvent::Kind kind) {
   const bool as_usual =
       kind == FarmEvent::kJoined || kind == FarmEvent::kReturned || kind == FarmEvent::kLeft;
   return as_usual ? LogLevel::kInfo : LogLevel::kWarn;
+}
+
+bool is_tcp(const std::string& endpoint) { return endpoint.rfind("tcp://", 0) == 0; }
+
+// Where the farm listens, and how it is protected there.
+Result<LinkSecurity> link_security(const FarmOptions& options,
+                                   const std::vector<std::string>& endpoints) {
+  LinkSecurity security;
+  if (std::ranges::none_of(endpoints, is_tcp)) return security;
+  if (!options.insecure) return master_security(options.keys);
+  security.open = options.insecure_anywhere ? OpenLinks::kAnywhere : OpenLinks::kLoopback;
+  return security;
+}
+
+std::vector<std::string> endpoints_of(const FarmOptions& options, const FarmSettings& settings) {
+  if (options.listen.empty() && settings.listen) return {*settings.listen};
+  return options.listen;
 }
 
 }  // namespace
@@ -100,29 +115,30 @@ void FarmOptions::declare(CLI::App& app, bool remote) {
   app.add_flag("--insecure-anywhere", insecure_anywhere,
                "With --insecure: on every network that --listen names")
       ->needs(open);
-  log.declare(app);
+  static const std::map<std::string, LogFormat> kFormats = {{"text", LogFormat::kText},
+                                                            {"json", LogFormat::kJson}};
+  static const std::map<std::string, LogLevel> kLevels = {{"debug", LogLevel::kDebug},
+                                                          {"info", LogLevel::kInfo},
+                                                          {"warn", LogLevel::kWarn},
+                                                          {"error", LogLevel::kError},
+                                                          {"off", LogLevel::kOff}};
+  app.add_option("--log-format", log_format, "Of what goes to stderr: text or json, a line each")
+      ->transform(CLI::CheckedTransformer(kFormats).description(""))
+      ->type_name("FORMAT");
+  app.add_option("--log-level", log_level,
+                 "debug (every job), info, warn, error or off (default: warn; info for json)")
+      ->transform(CLI::CheckedTransformer(kLevels).description(""))
+      ->type_name("LEVEL");
 }
 
-namespace {
-
-bool is_tcp(const std::string& endpoint) { return endpoint.rfind("tcp://", 0) == 0; }
-
-// Where the farm listens, and how it is protected there.
-Result<LinkSecurity> link_security(const FarmOptions& options,
-                                   const std::vector<std::string>& endpoints) {
-  LinkSecurity security;
-  if (std::ranges::none_of(endpoints, is_tcp)) return security;
-  if (!options.insecure) return master_security(options.keys);
-  security.open = options.insecure_anywhere ? OpenLinks::kAnywhere : OpenLinks::kLoopback;
-  return security;
+std::unique_ptr<Log> FarmOptions::open_log() const {
+  LogOptions options;
+  options.program = "gapfarm";
+  options.format = log_format;
+  options.level =
+      log_level.value_or(log_format == LogFormat::kJson ? LogLevel::kInfo : LogLevel::kWarn);
+  return std::make_unique<Log>(options);
 }
-
-std::vector<std::string> endpoints_of(const FarmOptions& options, const FarmSettings& settings) {
-  if (options.listen.empty() && settings.listen) return {*settings.listen};
-  return options.listen;
-}
-
-}  // namespace
 
 Status check_farm(const FarmOptions& options, const FarmSettings& settings) {
   const std::vector<std::string> endpoints = endpoints_of(options, settings);
@@ -321,31 +337,6 @@ Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
   ASSIGN_OR_RETURN(Model model, find_model(run_or_model, console));
   RETURN_IF_ERROR(check_can(model.scenario, kPredicts, run_or_model));
   return model;
-}
-
-void LogFlags::declare(CLI::App& app) {
-  static const std::map<std::string, LogFormat> kFormats = {{"text", LogFormat::kText},
-                                                            {"json", LogFormat::kJson}};
-  static const std::map<std::string, LogLevel> kLevels = {{"debug", LogLevel::kDebug},
-                                                          {"info", LogLevel::kInfo},
-                                                          {"warn", LogLevel::kWarn},
-                                                          {"error", LogLevel::kError},
-                                                          {"off", LogLevel::kOff}};
-  app.add_option("--log-format", format, "Of what goes to stderr: text or json, a line each")
-      ->transform(CLI::CheckedTransformer(kFormats).description(""))
-      ->type_name("FORMAT");
-  app.add_option("--log-level", level,
-                 "debug (every job), info, warn, error or off (default: warn; info for json)")
-      ->transform(CLI::CheckedTransformer(kLevels).description(""))
-      ->type_name("LEVEL");
-}
-
-std::unique_ptr<Log> LogFlags::open() const {
-  LogOptions options;
-  options.program = "gapfarm";
-  options.format = format;
-  options.level = level.value_or(format == LogFormat::kJson ? LogLevel::kInfo : LogLevel::kWarn);
-  return std::make_unique<Log>(options);
 }
 
 void report_to(Log& log, SocketFarmOptions& options) {

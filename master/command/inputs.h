@@ -3,16 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
-#include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "common/base/result.h"
 #include "common/config/config.h"
 #include "common/config/model.h"
 #include "common/config/settings.h"
-#include "common/log/log.h"
 #include "common/net/keys.h"
 #include "common/problem/problem.h"
 #include "common/trials/read.h"
@@ -22,14 +18,6 @@
 #include "master/run/stored_run.h"
 
 namespace gapfarm {
-
-struct LogFlags {
-  LogFormat format = LogFormat::kText;
-  std::optional<LogLevel> level;  // none: warnings as text, info as JSON
-
-  void declare(CLI::App& app);
-  std::unique_ptr<Log> open() const;
-};
 
 // While it lives, the console's notes and errors are lines of a log that is not for people.
 class NotesGoTo {
@@ -100,9 +88,11 @@ struct FarmOptions {
   std::string keys = KeyFolder::default_path();
   bool insecure = false;
   bool insecure_anywhere = false;
-  LogFlags log = {};
+  LogFormat log_format = LogFormat::kText;
+  std::optional<LogLevel> log_level = {};  // none: warnings as text, info as JSON
 
   void declare(CLI::App& app, bool remote);
+  std::unique_ptr<Log> open_log() const;
 };
 
 unsigned local_workers(const FarmOptions& options, const FarmSettings& settings);

@@ -10,10 +10,7 @@
 #include <utility>
 
 #include "common/base/build_info.h"
-#include "common/base/clock.h"
 #include "common/base/hash.h"
-#include "common/base/text.h"
-#include "common/json/json.h"
 #include "common/process/child.h"
 #include "common/trials/files.h"
 
@@ -49,20 +46,39 @@ std::string state_of_exit(int exit_code) {
   return "failed";
 }
 
+std::string value_of(const CLI::App& command, const std::string& name) {
+  const CLI::Option* option = command.get_option_no_throw(name);
+  return option == nullptr || option->count() == 0 ? std::string() : option->results().front();
+}
+
+// The folder or file that the command leaves, as a whole path; empty: none.
+std::string out_of(const CLI::App& command) {
+  std::string out = value_of(command, "--out");
+  if (out.empty()) out = value_of(command, "RUN");
+  if (out.empty() || out == "-") return {};
+  return whole_path(out);
+}
+
+// Its exit status, or what kept it from starting.
+Result<int> run_shell(const std::string& text, const std::vector<std::string>& variables) {
+  ChildSetup setup;
+  setup.arguments = {"/bin/sh", "-c", text};
+  setup.environment = variables;
+  setup.in = STDIN_FILENO;
+  setup.death_signal = 0;
+  ASSIGN_OR_RETURN(const pid_t pid, under("cannot start it", start_child(setup)));
+  int status = 0;
+  await_child(pid, std::numeric_limits<double>::infinity(), &status);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : kExitSignalBase + WTERMSIG(status);
+}
+
 }  // namespace
 
 std::string command_line() { return "gapfarm " + joined(own_arguments(), " ", shell_quoted); }
 
-void KeepOption::declare(CLI::App& app) {
-  app.add_option(
-         "--keep", folder,
-         "Folder for what is simulated, so that a stopped command goes on (default: "
-         "OUT.partial or, without a file, one in ~/.local/state/gapfarm; gone when finished)")
-      ->type_name("FOLDER");
-}
-
-Result<KeepingPlace> KeepOption::place(const std::string& command, const std::string& out) const {
-  if (!folder.empty()) return KeepingPlace{folder, false};
+Result<KeepingPlace> keeping_place(const std::string& given, const std::string& command,
+                                   const std::string& out) {
+  if (!given.empty()) return KeepingPlace{given, false};
   if (!out.empty() && out != "-") return KeepingPlace{out + ".partial", true};
   const std::string state = state_folder();
   if (state.empty()) {
@@ -274,36 +290,6 @@ void LongCommand::end(int exit_code) {
   }
   write_record();
 }
-
-namespace {
-
-std::string value_of(const CLI::App& command, const std::string& name) {
-  const CLI::Option* option = command.get_option_no_throw(name);
-  return option == nullptr || option->count() == 0 ? std::string() : option->results().front();
-}
-
-// The folder or file that the command leaves, as a whole path; empty: none.
-std::string out_of(const CLI::App& command) {
-  std::string out = value_of(command, "--out");
-  if (out.empty()) out = value_of(command, "RUN");
-  if (out.empty() || out == "-") return {};
-  return whole_path(out);
-}
-
-// Its exit status, or what kept it from starting.
-Result<int> run_shell(const std::string& text, const std::vector<std::string>& variables) {
-  ChildSetup setup;
-  setup.arguments = {"/bin/sh", "-c", text};
-  setup.environment = variables;
-  setup.in = STDIN_FILENO;
-  setup.death_signal = 0;
-  ASSIGN_OR_RETURN(const pid_t pid, under("cannot start it", start_child(setup)));
-  int status = 0;
-  await_child(pid, std::numeric_limits<double>::infinity(), &status);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : kExitSignalBase + WTERMSIG(status);
-}
-
-}  // namespace
 
 void declare_long_command(CLI::App& app) {
   app.add_option_function<std::string>(

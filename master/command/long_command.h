@@ -4,12 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <memory>
-#include <string>
 #include <vector>
 
-#include "common/base/result.h"
-#include "common/progress/overall_progress.h"
 #include "master/command/console.h"
 #include "master/farm/farm.h"
 #include "master/store/answer_store.h"
@@ -27,15 +23,10 @@ struct KeepingPlace {
   bool forget = false;   // the answers go then: they are large, and nobody asks them again
 };
 
-// --keep for commands that leave no folder.
-struct KeepOption {
-  std::string folder;
-
-  void declare(CLI::App& app);
-  // The folder given, else OUT.partial beside the file `out`, else (empty or "-") one of this very
-  // command line under $XDG_STATE_HOME or ~/.local/state.  Error: there is none of these.
-  Result<KeepingPlace> place(const std::string& command, const std::string& out) const;
-};
+// The folder `given`, else OUT.partial beside the file `out`, else (empty or "-") one of this very
+// command line under $XDG_STATE_HOME or ~/.local/state.  Error: there is none of these.
+Result<KeepingPlace> keeping_place(const std::string& given, const std::string& command,
+                                   const std::string& out);
 
 class LongCommand {
  public:

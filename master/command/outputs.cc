@@ -7,15 +7,10 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
-#include <string_view>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/config/config.h"
 #include "common/trials/files.h"
-#include "master/store/records.h"
 
 namespace gapfarm {
 namespace {
@@ -210,8 +205,14 @@ Status Outputs::write_in(const std::string& folder, const NamedTexts& files) con
 
 void LongOptions::declare(CLI::App& app, Leaves leaves, bool remote) {
   leaves_ = leaves;
-  outputs.declare(app);
-  if (leaves == Leaves::kFile) keep.declare(app);
+  if (leaves != Leaves::kNothing) outputs.declare(app);
+  if (leaves != Leaves::kFolder) {
+    app.add_option(
+           "--keep", keep,
+           "Folder for what is simulated, so that a stopped command goes on (default: "
+           "OUT.partial or, without a file, one in ~/.local/state/gapfarm; gone when finished)")
+        ->type_name("FOLDER");
+  }
   farm.declare(app, remote);
   declare_long_command(app);
 }
@@ -220,8 +221,9 @@ Result<std::unique_ptr<Farm>> LongOptions::begin(const std::string& command,
                                                  std::vector<ProgressStage> stages,
                                                  const FarmSettings& settings,
                                                  CliContext& context) const {
-  if (leaves_ == Leaves::kFile) {
-    LongCommand::begin_if_possible(command, keep.place(command, out), std::move(stages), context);
+  if (leaves_ != Leaves::kFolder) {
+    LongCommand::begin_if_possible(command, keeping_place(keep, command, out), std::move(stages),
+                                   context);
   } else {
     const KeepingPlace place{out, /*passing=*/false, /*forget=*/true};
     RETURN_IF_ERROR(LongCommand::begin(command, place, std::move(stages), context));

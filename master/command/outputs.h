@@ -2,11 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <string>
-#include <vector>
 
-#include "common/base/result.h"
-#include "common/config/settings.h"
 #include "common/trials/trial.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
@@ -67,17 +63,18 @@ class Outputs {
   std::vector<Planned> planned_;
 };
 
-// What most long commands take: --force, workers, and where to keep what is simulated.
+// What most long commands take: workers, --force where they leave something, and where to keep what
+// is simulated.
 struct LongOptions {
   std::string out;  // file or folder that the command leaves
   Outputs outputs;
   FarmOptions farm;
-  KeepOption keep;
+  std::string keep;  // --keep: folder for what is simulated; empty: keeping_place()'s
 
-  enum class Leaves { kFile, kFolder };  // a folder keeps by itself: without --keep
+  enum class Leaves { kNothing, kFile, kFolder };  // a folder keeps by itself: without --keep
   void declare(CLI::App& app, Leaves leaves, bool remote);
 
-  // The command's work begins (LongCommand), in keep's place or in the folder `out`: the farm that
+  // The command's work begins (LongCommand), in `keep` or in the folder `out`: the farm that
   // it asks.  What is simulated goes at the end: paths are large, and no figure refers to them.
   Result<std::unique_ptr<Farm>> begin(const std::string& command, std::vector<ProgressStage> stages,
                                       const FarmSettings& settings, CliContext& context) const;

@@ -9,10 +9,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <string_view>
 
-#include "common/base/clock.h"
-#include "common/base/text.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/command/console.h"

@@ -4,29 +4,22 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/config/config.h"
-#include "common/trials/trial.h"
 #include "master/cli/models/parameter_options.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
+#include "master/command/outputs.h"
 
 namespace gapfarm {
 namespace {
 
-struct CrossfitOptions {
+struct CrossfitOptions : LongOptions {
   std::string config;
   TrialOptions trials;
   CrossfitPlan plan;
   std::vector<std::string> only, tests, set, genes;
   std::optional<std::uint64_t> evaluations, seed;
-  FarmOptions farm;
-  KeepOption keep;
 };
 
 CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
@@ -127,14 +120,6 @@ Status apply(const CrossfitOptions& options, Config& config) {
   return check_evolvable(config);
 }
 
-Result<int> print_fits(const CrossfitOptions& options, const Config& config, CliContext& context) {
-  const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
-  const std::string would =
-      fmt::format("tune {} parameters on parts of {} trials and try them on others", genes, trials);
-  return print_dry_run(would, {{"genes", genes}, {"trials", trials}}, options.farm, config.farm,
-                       context);
-}
-
 Result<int> run_crossfit(const CrossfitOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(const auto config,
                    open_config(options.config, options.trials, context.console,
@@ -142,11 +127,16 @@ Result<int> run_crossfit(const CrossfitOptions& options, CliContext& context) {
   show_warnings(config.problem, config.trial_files, context.console);
   CrossfitPlan plan = plan_of(options, config);
   RETURN_IF_ERROR(check_crossfit(config.problem, plan));
-  if (context.dry_run) return print_fits(options, config, context);
-  LongCommand::begin_if_possible("crossfit", options.keep.place("crossfit", ""), {{"fit"}},
-                                 context);
+  if (context.dry_run) {
+    const std::size_t genes = config.problem.genes.size(),
+                      trials = config.problem.log.trials.size();
+    return print_dry_run(
+        fmt::format("tune {} parameters on parts of {} trials and try them on others", genes,
+                    trials),
+        {{"genes", genes}, {"trials", trials}}, options.farm, config.farm, context);
+  }
+  ASSIGN_OR_RETURN(const auto asked, options.begin("crossfit", {{"fit"}}, config.farm, context));
   plan.hooks = context.work->hooks();
-  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
   ASSIGN_OR_RETURN(const auto groups, crossfit(config.problem, plan, *asked));
   context.console.result(
       joined(groups, "", [&](const auto& group) { return describe(config.problem, group); }),
@@ -179,9 +169,7 @@ SubcommandRun setup_crossfit(CLI::App& app) {
       "--evaluations", options->evaluations,
       "Stop each fit after the generation in which so many are reached, in place of the config's");
   app.add_option("--seed", options->seed, "In place of the config's");
-  options->keep.declare(app);
-  options->farm.declare(app, false);
-  declare_long_command(app);
+  options->declare(app, LongOptions::Leaves::kNothing, false);
   app.footer(
       "Examples:\n"
       "  gapfarm crossfit configs/push.toml --trials pushes.csv --by object \\\n"
