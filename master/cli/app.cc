@@ -6,8 +6,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/process/stop.h"
 #include "common/usage/usage.h"
 #include "master/cli/run_arguments.h"
 #include "master/cli/subcommand.h"

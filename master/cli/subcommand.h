@@ -4,12 +4,9 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
-#include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "common/base/result.h"
 #include "master/command/console.h"
 
 namespace gapfarm {

@@ -1,15 +1,12 @@
 // gapfarm check CONFIG: everything that a run would need, without running it.
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 
-#include "common/base/clock.h"
 #include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/math/statistics.h"
-#include "common/problem/problem.h"
 #include "master/cli/data/idle_genes.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
@@ -17,7 +14,6 @@
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 #include "master/ground/program_runs.h"
-#include "master/io/log_checks/log_checks.h"
 #include "master/run/run.h"
 
 namespace gapfarm {
@@ -43,12 +39,6 @@ bool has_failed(const v1::TaskResult& result) {
   return result.outcome() != v1::OK && result.outcome() != v1::INFEASIBLE;
 }
 
-// Values about the middle of every gene's range, of which no two have been simulated: at the same
-// ones a worker scores again what it simulated.
-Genome genome_of(const Problem& problem, unsigned k) {
-  return k == 0 ? Genome() : Genome(problem.genes.size(), 0.5 + 0.01 * k);
-}
-
 // The config's own values by one worker, and the seconds that other ones take once it knows the
 // problem: the median of a few.
 Status measure_evaluation(const Config& config, CliContext& context, Summary* summary) {
@@ -63,10 +53,12 @@ Status measure_evaluation(const Config& config, CliContext& context, Summary* su
   std::vector<double> took_s;
   double all_s = 0;
   for (unsigned k = 0; k <= kFew && all_s < kLong_s; ++k) {
+    // About the middle of every gene's range, no two alike: at the same values a worker scores
+    // again what it simulated.
+    const Genome genome = k == 0 ? Genome() : Genome(config.problem.genes.size(), 0.5 + 0.01 * k);
     const double began_s = monotonic_seconds();
-    ASSIGN_OR_RETURN(
-        const auto results,
-        farm->run(hash, {evaluation_task({0, k, genome_of(config.problem, k)}, config.seed)}));
+    ASSIGN_OR_RETURN(const auto results,
+                     farm->run(hash, {evaluation_task({0, k, genome}, config.seed)}));
     took_s.push_back(monotonic_seconds() - began_s);
     all_s += took_s.back();
     if (k > 0) continue;
@@ -222,44 +214,41 @@ std::string standing(const Summary& summary) {
 std::string search_text(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
   if (problem.genes.empty()) return "\ngenes        none: nothing can be evolved\n";
-  std::string text = "\ngenes        " + std::to_string(problem.genes.size()) + "\n";
+  std::string text = fmt::format("\ngenes        {}\n", problem.genes.size());
   for (const Gene& gene : problem.genes) {
-    const Parameter& row = problem.table()[gene.row];
-    text += "             " + row.key + " in [" + problem.table().format(gene.row, gene.lower) +
-            ", " + problem.table().format(gene.row, gene.upper) + "]" +
-            (gene.scale == ParameterScale::kLog ? ", log scale" : "") + "\n";
+    const auto end = [&](double value) { return problem.table().format(gene.row, value); };
+    text += fmt::format("             {} in [{}, {}]{}\n", problem.table()[gene.row].key,
+                        end(gene.lower), end(gene.upper),
+                        gene.scale == ParameterScale::kLog ? ", log scale" : "");
   }
   const OptimiserKind kind = config.evolution.optimiser.kind;
-  text += "evolution    " +
-          (kind == OptimiserKind::kGenetic
-               ? std::to_string(config.evolution.population) + " individuals"
-               : "by " + std::string(optimisers()[static_cast<std::size_t>(kind)].name)) +
-          ", at most " + std::to_string(config.evolution.generations) + " generations, seed " +
-          std::to_string(config.seed) + "\n";
+  text += fmt::format("evolution    {}, at most {} generations, seed {}\n",
+                      kind == OptimiserKind::kGenetic
+                          ? fmt::format("{} individuals", config.evolution.population)
+                          : fmt::format("by {}", optimisers()[static_cast<std::size_t>(kind)].name),
+                      config.evolution.generations, config.seed);
   const std::string unread = unread_by_search(config.text, kind);
   if (!unread.empty()) text += "             " + unread + "\n";
-  const auto most = most_evaluations(config.evolution, config.problem.genes.size());
-  const double all_s = summary.evaluation_s * static_cast<double>(most);
-  const double one_s = summary.evaluation_s;
+  const auto most = most_evaluations(config.evolution, problem.genes.size());
+  const double one_s = summary.evaluation_s, all_s = one_s * static_cast<double>(most);
   if (one_s > 0) {
-    text += "cost         " +
-            (one_s < 1 ? format_number(one_s, 2) + " s" : format_duration(one_s)) +
-            " an evaluation (measured here); " + std::to_string(most) + " of them about " +
-            format_duration(all_s / std::max(1u, workers)) + " on " + std::to_string(workers) +
-            " workers like it\n";
+    text += fmt::format(
+        "cost         {} an evaluation (measured here); {} of them about {} on {} workers like "
+        "it\n",
+        one_s < 1 ? format_number(one_s, 2) + " s" : format_duration(one_s), most,
+        format_duration(all_s / std::max(1u, workers)), workers);
   }
-  text += "farm         " + std::to_string(workers) + " local workers";
+  text += fmt::format("farm         {} local workers", workers);
   if (config.farm.listen) text += ", and remote ones at " + *config.farm.listen;
-  text += "\nproblem      " + problem_hash(to_proto(problem)) + "\n";
-  return text;
+  return text + "\nproblem      " + problem_hash(to_proto(problem)) + "\n";
 }
 
 std::string describe(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
   std::string text = config.path + ": " + standing(summary) + "\n";
   for (const SanityFinding& f : summary.sanity) {
-    text += std::string(f.severity == Severity::kNote ? "note " : "doubt") + "        " + f.name +
-            ": " + f.text + " " + f.remedy + "\n";
+    text += fmt::format("{}        {}: {} {}\n", f.severity == Severity::kNote ? "note " : "doubt",
+                        f.name, f.text, f.remedy);
   }
   for (const IdleGene& gene : summary.idle) {
     text += "idle gene    " + gene.key + " changes no score; " + gene.remedy + ".\n";
@@ -284,16 +273,15 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
     }
     text += "\n";
   }
-  text += "trials       " + std::to_string(summary.trials) + " in " +
-          std::to_string(summary.sessions) + " sessions:";
+  text += fmt::format("trials       {} in {} sessions:", summary.trials, summary.sessions);
   for (const auto& [command, count] : summary.commands) {
-    text += " " + std::to_string(count) + " " + command;
+    text += fmt::format(" {} {}", count, command);
   }
-  text += "\nmotions      " + std::to_string(motions_of(summary)) + " simulated an evaluation";
-  text += "\neffects      ";
-  text += summary.effects.empty() ? "none" : joined(summary.effects);
-  text += "\nfitness      " + std::string(fitness_name(problem.fitness.kind)) +
-          (higher_is_better(problem.fitness.kind) ? ", higher is better" : ", lower is better");
+  text += fmt::format(
+      "\nmotions      {} simulated an evaluation\neffects      {}\nfitness      {}, {} is better",
+      motions_of(summary), summary.effects.empty() ? "none" : joined(summary.effects),
+      fitness_name(problem.fitness.kind),
+      higher_is_better(problem.fitness.kind) ? "higher" : "lower");
   return text + search_text(config, summary, workers);
 }
 

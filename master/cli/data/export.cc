@@ -3,13 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
 #include "common/json/matrix.h"
-#include "common/problem/problem.h"
 #include "common/trials/files.h"
 #include "master/cli/data/export_command.h"
 #include "master/diagnose/result/diagnosis_json.h"
@@ -17,7 +14,6 @@
 #include "master/ground/report/ranges.h"
 #include "master/ground/report/ros_export.h"
 #include "master/ground/report/simulator_model.h"
-#include "master/io/log_checks/log_checks.h"
 #include "master/io/robot_files/controllers.h"
 #include "master/io/robot_files/understand.h"
 #include "master/store/run_reader.h"
@@ -28,12 +24,6 @@ namespace {
 constexpr int kMostSamplesOut = 9999;
 constexpr double kLeastShift_s = 1e-3;
 constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two poses is longer than
-
-// Whether rows that hold wheels and increments were read at other times after all.
-bool clocks_are_apart(const GroundRobot& robot, const GroundReference& fit) {
-  const double own = robot.motors.delay_s;
-  return std::abs(fit.value_or("delay", own) - own) > kLeastShift_s;
-}
 
 // Friction as the run has it, where the run searched for it.
 RosFriction simulated_friction(const Problem& problem, const Model& model) {
@@ -83,7 +73,8 @@ Result<GroundReference> fit_source(const GroundSource& source, Console& console)
     return ask_what_changed(robot, log, windows, 1, nullptr, /*alone=*/true);
   };
   ASSIGN_OR_RETURN(auto asked, ask(together ? each_row : summed));
-  if (together && clocks_are_apart(robot, *asked.reference)) {
+  const double delay_s = robot.motors.delay_s;
+  if (together && std::abs(asked.reference->value_or("delay", delay_s) - delay_s) > kLeastShift_s) {
     ASSIGN_OR_RETURN(asked, ask(summed));
   }
   return *std::move(asked.reference);

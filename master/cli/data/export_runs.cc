@@ -6,8 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/json/json.h"
-#include "common/problem/problem.h"
 #include "master/cli/data/export_command.h"
 #include "master/ground/paths.h"
 #include "master/io/logs/bags.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "common/base/text.h"
 #include "common/random/stream.h"
 #include "master/evolve/evolve.h"
 

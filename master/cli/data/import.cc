@@ -1,19 +1,12 @@
 // gapfarm import FORMAT FILES: other programs' logs to the trial format.
 
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/problem/problem.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
-#include "common/trials/read.h"
 #include "common/trials/write.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
 #include "master/command/outputs.h"
 #include "master/io/logs/bags.h"
 #include "master/io/logs/column_map.h"

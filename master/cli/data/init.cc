@@ -5,18 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
-#include "common/trials/read.h"
 #include "master/cli/data/robot_setup.h"
-#include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/outputs.h"
 
 namespace gapfarm {
 namespace {

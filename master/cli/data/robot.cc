@@ -2,7 +2,6 @@
 #include "common/robot/robot.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"

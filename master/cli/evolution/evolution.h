@@ -2,13 +2,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <optional>
 
 #include "master/cli/evolution/fleet_options.h"
-#include "master/command/inputs.h"
 #include "master/command/outputs.h"
 #include "master/command/page_along.h"
-#include "master/run/stored_run.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {

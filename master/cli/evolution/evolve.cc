@@ -1,19 +1,126 @@
 // gapfarm evolve CONFIG: evolve parameters against a trial log.
+#include <spdlog/fmt/fmt.h>
 
-#include <memory>
+#include <limits>
 #include <nlohmann/json.hpp>
 
-#include "common/config/config.h"
+#include "common/base/build_info.h"
+#include "common/json/fields.h"
+#include "common/trials/files.h"
 #include "master/cli/evolution/evolution.h"
 #include "master/cli/evolution/search_start.h"
 #include "master/cli/subcommand.h"
-#include "master/command/long_command.h"
 #include "master/run/run.h"
-#include "master/run/stored_run.h"
-#include "master/store/run_store.h"
+#include "master/run/run_page.h"
+#include "master/store/schema.h"
 
 namespace gapfarm {
 namespace {
+
+// A run's words, to its user.
+class OnConsole : public RunWatcher {
+ public:
+  explicit OnConsole(Console& console) : console_(console) {}
+  void note(std::string_view text) override { console_.note(text); }
+  void error(const Error& error) override { console_.error(error); }
+  void progress(std::string_view text, bool news) override {
+    if (text.empty()) return console_.clear_progress();
+    console_.progress(text, news);
+  }
+  void read(const TrialLog& log) override { show_notes(log, console_); }
+
+ private:
+  Console& console_;
+};
+
+void declare_overrides(EvolutionOverrides& overrides, CLI::App& app) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+  app.add_option("--generations", overrides.generations, "Stop after so many generations")
+      ->check(CLI::Range(std::uint64_t{1}, kMost, "1+"));
+  app.add_option("--evaluations", overrides.evaluations,
+                 "Stop after the generation in which so many evaluations are reached")
+      ->check(CLI::Range(std::uint64_t{1}, kMost, "1+"));
+  app.add_option("--time", overrides.time_s, "Stop after so many seconds")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--target", overrides.target_fitness, "Stop at this fitness");
+  app.add_option("--population", overrides.population, "Individuals")
+      ->check(CLI::Range(2, 1000000, "2+"));
+}
+
+Result<std::unique_ptr<Farm>> open_farm(const RunStore& store, const Config& config,
+                                        const EvolutionOptions& options, Log& log,
+                                        const std::function<void(const FarmEvent&)>& keep,
+                                        CliContext& context) {
+  SocketFarmOptions base;
+  base.epoch = store.epoch();
+  const RunInfo& run = store.info();
+  if (run.fingerprint == build_info().fingerprint) {
+    base.admittance.numeric_class = run.numeric_class;
+  } else {
+    context.console.note("another build made this run (gapfarm " + run.program_version +
+                         ", build " + run.fingerprint +
+                         "): from here on its numbers are this build's");
+  }
+  base.shuffle_seed = options.shuffle;
+  report_to(log, base);
+  base.on_event = [keep, next = base.on_event](const FarmEvent& event) {
+    keep(event);
+    if (next) next(event);
+  };
+  ASSIGN_OR_RETURN(auto farm, start_farm(options.farm, config.farm, context, base));
+  for (const std::string& endpoint : farm->endpoints()) {
+    if (endpoint.rfind("ipc://", 0) != 0) {
+      context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
+    }
+  }
+  return std::unique_ptr<Farm>(std::move(farm));
+}
+
+// Where workers of --workers-on find the master that listens there.
+Result<std::string> endpoint_of_fleet(const std::vector<std::string>& endpoints) {
+  for (const std::string& endpoint : endpoints) {
+    if (endpoint.rfind("tcp://", 0) == 0) return reachable(endpoint, host_name());
+  }
+  return Error{"--workers-on needs an endpoint that workers reach; give --listen tcp://*:PORT"};
+}
+
+void add_validation(const RunSummary& summary, const Problem& problem, std::string& text,
+                    Json& json) {
+  if (summary.validated.empty()) return;
+  text += fmt::format("validation on {} {} held out, {}:\n", summary.held_out,
+                      problem.windows() ? "windows" : "trials", fitness_name(problem.fitness.kind));
+  for (const ScoreRow& row : summary.validated) {
+    text += fmt::format("  {:<24} {}\n", row.name,
+                        row.score ? fmt::format("{:.6g}", *row.score) : "does not end well");
+    json["validation"].push_back({{"name", row.name}, {"fitness", number_or_null(row.score)}});
+  }
+}
+
+void show(const RunSummary& summary, const RunStore& store, const Problem& problem,
+          Console& console) {
+  const EvolveSummary& evolved = summary.evolved;
+  const FitnessKind kind = problem.fitness.kind;
+  Json json = {
+      {"run", store.run().string()},        {"state", summary.stopped() ? "stopped" : "finished"},
+      {"stop_reason", evolved.text},        {"generations", evolved.generations},
+      {"evaluations", evolved.evaluations}, {"wall_s", evolved.wall_s},
+      {"fitness", fitness_name(kind)},      {"best_fitness", nullptr}};
+  std::string text = evolved.text;
+  if (evolved.best && evolved.best->standing.outcome == v1::OK) {
+    const double best = fitness_of_cost(kind, evolved.best->standing.cost);
+    text += fmt::format("; best {} {:.6g}", fitness_name(kind), best);
+    json["best_fitness"] = best;
+  }
+  text += fmt::format(" after {} generations, {} evaluations, {}\n", evolved.generations,
+                      evolved.evaluations, format_duration(evolved.wall_s));
+  add_validation(summary, problem, text, json);
+  for (const std::string& file : summary.files) json["files"].push_back(file);
+  if (!summary.files.empty()) {
+    text += fmt::format("wrote: {}\n", fmt::join(summary.files, ", "));
+  }
+  if (!summary.stopped()) json["given_up"] = summary.given_up;
+  console.result(text, json);
+}
 
 struct EvolveCommand {
   std::string config;
@@ -25,28 +132,25 @@ struct EvolveCommand {
 };
 
 std::string what_evolves(const Problem& problem) {
-  std::string parameters = std::to_string(problem.genes.size()) + " parameters ";
-  for (const SearchedObjective& objective : problem.fitness.objectives) {
-    const bool first = &objective == &problem.fitness.objectives.front();
-    parameters += (first ? "to the front of " : "and ") + objective.name + " ";
+  const FitnessSettings& fitness = problem.fitness;
+  const std::string parameters = std::to_string(problem.genes.size()) + " parameters ";
+  if (!is_value(fitness.kind)) {
+    return parameters + "on " + std::to_string(problem.log.trials.size()) + " trials";
   }
-  if (is_value(problem.fitness.kind) && !problem.fitness.objectives.empty()) {
-    parameters.pop_back();
-    return parameters;
+  if (!fitness.objectives.empty()) {
+    return parameters + "to the front of " +
+           joined(fitness.objectives, " and ", &SearchedObjective::name);
   }
-  if (is_value(problem.fitness.kind)) {
-    return parameters + "to the " +
-           (higher_is_better(problem.fitness.kind) ? "greatest value" : "least value");
-  }
-  return parameters + "on " + std::to_string(problem.log.trials.size()) + " trials";
+  return parameters + "to the " + (higher_is_better(fitness.kind) ? "greatest" : "least") +
+         " value";
 }
 
 Result<int> print_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
-  const std::string would = "evolve " + what_evolves(config.problem) + " into " + command.out +
-                            ", seed " + std::to_string(config.seed) + ", population " +
-                            std::to_string(config.evolution.population) + ", at most " +
-                            std::to_string(config.evolution.generations) + " generations";
+  const std::string would =
+      fmt::format("evolve {} into {}, seed {}, population {}, at most {} generations",
+                  what_evolves(config.problem), command.out, config.seed,
+                  config.evolution.population, config.evolution.generations);
   return print_evolution_dry_run(would,
                                  {{"out", command.out},
                                   {"genes", genes},
@@ -59,7 +163,7 @@ Result<int> print_plan(const EvolveCommand& command, const Config& config, CliCo
 
 Result<int> run_evolve(EvolveCommand command, CliContext& context) {
   RETURN_IF_ERROR(command.options.complete());
-  const std::unique_ptr<Log> log = command.options.farm.log.open();
+  const std::unique_ptr<Log> log = command.options.farm.open_log();
   const NotesGoTo notes(*log, context.console);
   ASSIGN_OR_RETURN(
       const auto config,
@@ -83,6 +187,125 @@ Result<int> run_evolve(EvolveCommand command, CliContext& context) {
 }
 
 }  // namespace
+
+void EvolutionOptions::declare(CLI::App& app) {
+  declare_overrides(overrides, app);
+  outputs.declare(app);
+  farm.declare(app, true);
+  fleet.declare(app, "--workers-on");
+  page.declare(app);
+  declare_long_command(app);
+  app.add_option("--shuffle", shuffle,
+                 "Hand jobs out in an order shuffled by this seed; the results do not change")
+      ->group("");  // for tests
+}
+
+Result<int> print_evolution_dry_run(std::string would, Json facts, const EvolutionOptions& options,
+                                    const FarmSettings& settings, CliContext& context) {
+  if (!options.fleet.system.empty()) {
+    ASSIGN_OR_RETURN(const std::string endpoint, endpoint_of_fleet(options.farm.listen));
+    ASSIGN_OR_RETURN(const FleetLoopOptions loop,
+                     fleet_of(options.fleet, endpoint, options.farm.keys, options.farm.insecure));
+    const FleetLimits& limits = loop.fleet.limits;
+    std::string submission =
+        Fleet(loop.fleet, {}, {}).submission_text(limits.max_workers / limits.workers_per_job);
+    facts["submission"] = submission;
+    submission.pop_back();
+    would += fmt::format("\nwould submit up to {} workers by\n{}", limits.max_workers, submission);
+  }
+  return print_dry_run(would, std::move(facts), options.farm, settings, context);
+}
+
+Status EvolutionOptions::complete() {
+  if (fleet.system.empty()) return {};
+  RETURN_IF_ERROR(fleet.check());
+  if (farm.workers < 0) farm.workers = 0;
+  if (farm.listen.empty()) {
+    farm.listen = {fleet.system == "local" ? "tcp://127.0.0.1:*" : "tcp://*:*"};
+  }
+  return {};
+}
+
+Status EvolutionOptions::plan(const std::string& out, const Config& config,
+                              const std::string& from) {
+  RETURN_IF_ERROR(check_folder(out, FolderKind::kRun));
+  // RunStore::create() says that a run is there, or that no folder can be.
+  if (!is_there(out) || is_there(run_store_file(out))) return {};
+  ASSIGN_OR_RETURN(const auto stages, read_stages(config));
+  outputs.reads(config);
+  outputs.reads(from);
+  for (const auto* files : {&config.trial_files, &stages.validation_files}) {
+    for (const std::string& file : *files) outputs.reads(file);
+    outputs.reads_runs(*files);
+  }
+  std::vector<std::string> names = output_files(config.problem);
+  names.push_back("log.txt");
+  for (const std::string& name : names) {
+    RETURN_IF_ERROR(outputs.plan((std::filesystem::path(out) / name).string()));
+  }
+  return {};
+}
+
+Result<int> begin_run(const std::string& out, const Config& config, const EvolutionOptions& options,
+                      const EvolutionOverrides& overrides, Log& log, CliContext& context) {
+  if (context.stop.requested()) return kExitSignalBase + context.stop.signal();
+  const bool folder_was_there = is_there(out);
+  ASSIGN_OR_RETURN(RunStore store, RunStore::create(out, run_info(config, overrides)));
+  const int code = run_evolution(store, config, options, log, context);
+  const auto checkpoint = store.checkpoint();
+  if (code == kExitFailed && checkpoint && !*checkpoint) {
+    if (Status s = RunStore::discard(std::move(store), !folder_was_there); !s) {
+      context.console.error(s.error());
+    }
+  }
+  return code;
+}
+
+int run_evolution(RunStore& store, const Config& config, const EvolutionOptions& options, Log& log,
+                  CliContext& context) {
+  context.begun = true;  // a run folder was made or opened
+  const std::string run = store.run().string();
+  log.set({"run", run});
+  // Without it the run goes on all the same.
+  if (Status s = context.console.keep((store.run() / "log.txt").string()); !s) {
+    context.console.error(s.error());
+  }
+  log.copy_to(context.console.kept());
+  OnConsole watcher(context.console);
+  std::shared_ptr<void> page;
+  std::unique_ptr<OwnedChild> beside;
+  const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<Farm>> {
+    ASSIGN_OR_RETURN(page, open_page(options.page, store.run(), context));
+    auto made = open_farm(store, config, options, log, keep, context);
+    if (!made || options.fleet.system.empty()) return made;
+    ASSIGN_OR_RETURN(const std::string endpoint, endpoint_of_fleet((*made)->endpoints()));
+    ASSIGN_OR_RETURN(beside, start_workers_beside(options.fleet, endpoint, options.farm.keys,
+                                                  options.farm.insecure));
+    return made;
+  };
+  const auto summary = evolve_run(
+      store, {config, config.problem, log, farm, [&] { return context.stop.requested(); }},
+      watcher);
+  if (!summary) return failed(summary.error(), context);
+  show(*summary, store, config.problem, context.console);
+  if (summary->stopped()) {
+    context.console.note("continue with: gapfarm resume " + shell_quoted(run));
+    return kExitResumable;
+  }
+  const auto& best = summary->evolved.best;
+  if (best && best->standing.outcome != v1::OK) {
+    const std::string why = summary->failure.empty() ? "" : ": " + summary->failure;
+    context.console.note("there is no model" + why + "; what happened: gapfarm status " +
+                         shell_quoted(run));
+    return kExitFailed;
+  }
+  if (summary->given_up == 0) return kExitDone;
+  context.console.note(fmt::format(
+      "{} given up; which and why: gapfarm status {}",
+      summary->given_up == 1 ? "1 task was" : std::to_string(summary->given_up) + " tasks were",
+      shell_quoted(run)));
+  return kExitQuarantined;
+}
 
 SubcommandRun setup_evolve(CLI::App& app) {
   auto command = std::make_shared<EvolveCommand>();

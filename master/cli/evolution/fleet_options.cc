@@ -35,9 +35,8 @@ std::vector<std::string> worker_command(const FleetChoice& choice, const Cluster
   if (insecure) {
     command.push_back("--insecure");
   } else {
-    const bool there = !choice.worker_keys.empty() || !site.keys.empty();
     command.insert(command.end(), {"--keys", !choice.worker_keys.empty() ? choice.worker_keys
-                                             : there                     ? site.keys
+                                             : !site.keys.empty()        ? site.keys
                                                                          : whole_path(keys)});
   }
   if (choice.allow_external || site.allow_external) command.push_back("--allow-external");
@@ -144,22 +143,21 @@ Status FleetChoice::check() const {
 }
 
 Result<double> wall_time_s(const std::string& text) {
-  const Error wrong{"'" + text + "' is no wall time; give seconds, H:MM:SS or D-HH:MM:SS"};
-  const std::size_t dash = text.find('-');
+  const auto [before, after] = cut_at(text, '-');
+  auto parts = parts_of(after ? *after : before, ':');
+  if (after) parts.insert(parts.begin(), before);
+  const bool whole = after ? parts.size() == 4 : parts.size() == 1 || parts.size() == 3;
   double sum = 0;
-  unsigned parts = 0;
-  for (std::size_t at = 0; at <= text.size(); ++parts) {
-    std::size_t end = parts == 0 && dash != text.npos ? dash : text.find(':', at);
-    end = std::min(end, text.size());
+  bool numbers = true;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
     unsigned value = 0;
-    const auto [rest, error] = std::from_chars(text.data() + at, text.data() + end, value);
-    if (error != std::errc() || rest != text.data() + end) return wrong;
-    sum = sum * (parts == 1 && dash != text.npos ? 24 : 60) + value;
-    at = end + 1;
+    const char* end = parts[i].data() + parts[i].size();
+    const auto [rest, error] = std::from_chars(parts[i].data(), end, value);
+    numbers = numbers && error == std::errc() && rest == end;
+    sum = sum * (i == 1 && after ? 24 : 60) + value;
   }
-  const bool whole = dash == text.npos ? parts == 1 || parts == 3 : parts == 4;
-  if (!whole || sum < 1) return wrong;
-  return sum;
+  if (whole && numbers && sum >= 1) return sum;
+  return Error{"'" + text + "' is no wall time; give seconds, H:MM:SS or D-HH:MM:SS"};
 }
 
 Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& endpoint,

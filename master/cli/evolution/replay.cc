@@ -1,21 +1,18 @@
 // gapfarm replay RUN --genome ID: one individual of a run again, from what the run store keeps.
+#include <spdlog/fmt/fmt.h>
+
 #include <bit>
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/write.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
 #include "master/command/outputs.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/individual.h"
 #include "master/farm/planned_trials.h"
-#include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -140,12 +137,12 @@ Comparison compare(const Found& found, const Standing& again, const Problem& pro
   result.same = outcome == stored.outcome && fitness.has_value() == stored.fitness.has_value() &&
                 (!fitness || std::bit_cast<std::uint64_t>(*fitness) ==
                                  std::bit_cast<std::uint64_t>(*stored.fitness));
-  const std::string who = "genome " + std::to_string(stored.birth_id) + " of generation " +
-                          std::to_string(found.generation) + ": " + fitness_name(kind) + " ";
-  result.text = result.same ? who + in_full(outcome, fitness) + " from " +
-                                  std::to_string(again.scores) + " scores, the same to the bit\n"
-                            : who + "differs: stored " + in_full(stored.outcome, stored.fitness) +
-                                  ", replayed " + in_full(outcome, fitness) + "\n";
+  const std::string now = in_full(outcome, fitness);
+  result.text = fmt::format(
+      "genome {} of generation {}: {} {}\n", stored.birth_id, found.generation, fitness_name(kind),
+      result.same ? fmt::format("{} from {} scores, the same to the bit", now, again.scores)
+                  : fmt::format("differs: stored {}, replayed {}",
+                                in_full(stored.outcome, stored.fitness), now));
   result.json = {
       {"genome", stored.birth_id},
       {"generation", found.generation},

@@ -2,20 +2,14 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/trials/files.h"
 #include "master/cli/evolution/evolution.h"
 #include "master/cli/evolution/search_start.h"
 #include "master/cli/subcommand.h"
-#include "master/command/long_command.h"
 #include "master/run/run.h"
-#include "master/run/stored_run.h"
-#include "master/store/run_reader.h"
 
 namespace gapfarm {
 namespace {
@@ -27,18 +21,15 @@ struct ResumeCommand {
   EvolutionOptions options;
 };
 
-// A run goes on with the robot that it began with.
-void note_changed_robot(const Config& config, Console& console) {
-  if (config.robot_path.empty()) return;
-  const auto text = read_text_file(config.robot_path);
-  if (!text || *text == config.problem.robot_file) return;
-  console.note(config.robot_path +
-               " has changed since the run began, which goes on with the robot as it was; "
-               "`gapfarm evolve` takes the file as it is");
-}
-
-// What it declares may be as it was, and what it computes another thing.
-void note_changed_program(const Config& config, const std::string& began, Console& console) {
+// A run goes on with the robot that it began with.  What a program declares may be as it was, and
+// what it computes another thing.
+void note_changes(const Config& config, const std::string& began, Console& console) {
+  const auto robot = read_text_file(config.robot_path);
+  if (!config.robot_path.empty() && robot && *robot != config.problem.robot_file) {
+    console.note(config.robot_path +
+                 " has changed since the run began, which goes on with the robot as it was; "
+                 "`gapfarm evolve` takes the file as it is");
+  }
   if (!config.problem.external) return;
   const ExternalCommand& command = config.problem.external->command;
   for (const std::string& argument : command.argv) {
@@ -90,8 +81,7 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
   ASSIGN_OR_RETURN(const auto generations, reader.generations());
   ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
-  note_changed_robot(config, context.console);
-  note_changed_program(config, reader.info().created, context.console);
+  note_changes(config, reader.info().created, context.console);
   const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
   const std::uint64_t from = std::min(command.branch.generation.value_or(last), last);
   return print_evolution_dry_run(
@@ -102,14 +92,13 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
 }
 
 Result<int> run_branch(ResumeCommand& command, CliContext& context) {
-  const std::unique_ptr<Log> log = command.options.farm.log.open();
+  const std::unique_ptr<Log> log = command.options.farm.open_log();
   const NotesGoTo notes(*log, context.console);
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
   EvolutionOverrides overrides = EvolutionOverrides::from_json(reader.info().overrides);
   overrides.merge(command.options.overrides);
   ASSIGN_OR_RETURN(Config config, stored_config(reader.info(), overrides));
-  note_changed_robot(config, context.console);
-  note_changed_program(config, reader.info().created, context.console);
+  note_changes(config, reader.info().created, context.console);
   RETURN_IF_ERROR(branch_off(reader, command.branch, config));
   RETURN_IF_ERROR(check_runnable(config));
   RETURN_IF_ERROR(check_program(config, command.run));
@@ -141,14 +130,13 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
   RETURN_IF_ERROR(check_generation(command));
   RETURN_IF_ERROR(check_program(command));
   if (context.dry_run) return print_resume(command, context);
-  const std::unique_ptr<Log> log = command.options.farm.log.open();
+  const std::unique_ptr<Log> log = command.options.farm.open_log();
   const NotesGoTo notes(*log, context.console);
   ASSIGN_OR_RETURN(RunStore store, RunStore::open(command.run));
   context.begun = true;
   const Result<Config> config = stored_config(store.info(), command.options.overrides);
   if (!config) return stopped_by(store, {command.run + ": " + config.error().message});
-  note_changed_robot(*config, context.console);
-  note_changed_program(*config, store.info().created, context.console);
+  note_changes(*config, store.info().created, context.console);
   if (command.branch.generation) {
     const auto kept = store.truncate_after(*command.branch.generation);
     if (!kept) return stopped_by(store, kept.error());

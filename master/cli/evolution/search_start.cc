@@ -10,7 +10,6 @@
 #include <set>
 
 #include "common/base/ranges.h"
-#include "common/config/config.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/models/parameter_options.h"

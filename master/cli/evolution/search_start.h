@@ -3,10 +3,8 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "common/base/result.h"
 #include "common/config/settings.h"
 #include "master/command/console.h"
 #include "master/store/run_reader.h"

@@ -6,22 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <string>
 
 #include "common/base/build_info.h"
-#include "common/base/result.h"
-#include "common/config/config.h"
-#include "common/json/json.h"
-#include "common/problem/problem.h"
 #include "common/score/motion_model.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/page_along.h"
 #include "master/farm/planned_trials.h"
-#include "master/farm/socket_farm.h"
 #include "master/ground/paths.h"
 #include "master/run/run_page.h"
 #include "master/serve/http_server.h"

@@ -5,18 +5,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
-#include "master/command/console.h"
-#include "master/command/long_command.h"
 #include "master/store/records.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_reader.h"

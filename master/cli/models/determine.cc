@@ -4,16 +4,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/config/config.h"
-#include "common/trials/trial.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/evolve/evolve.h"
 
@@ -25,16 +19,6 @@ struct DetermineCommand : LongOptions {
   TrialOptions trials;
   DetermineSettings settings;
 };
-
-// The problem at the model's values, scored by likelihood whatever it was tuned by.
-Problem problem_at(const Config& config, const Model& model) {
-  Problem problem = config.problem;
-  problem.values = model.values;
-  problem.log = shifted(std::move(problem.log), -model.frame_x_m, -model.frame_y_m);
-  problem.fitness.kind = FitnessKind::kLogScore;
-  problem.spread = {};
-  return problem;
-}
 
 LikelihoodOf farm_likelihood(Farm& farm, const Problem& problem, std::uint64_t seed) {
   const std::string hash = farm.add_problem(to_proto(problem));
@@ -80,7 +64,8 @@ Json to_json(const DetermineReport& report, const ParameterTable& table) {
           {"failures", report.failures}};
 }
 
-// The problem, and that its table can be written.
+// The problem at the model's values, scored by likelihood whatever it was tuned by, and that its
+// table can be written.
 Result<Problem> open_problem(DetermineCommand& command, const Config& config, Console& console) {
   ASSIGN_OR_RETURN(const Model model, read_model_of(command.model, console));
   RETURN_IF_ERROR(check_no_residual(model, command.model, "determine"));
@@ -89,7 +74,12 @@ Result<Problem> open_problem(DetermineCommand& command, const Config& config, Co
   command.outputs.reads((std::filesystem::path(command.model) / "model.toml").string());
   RETURN_IF_ERROR(command.outputs.plan(command.out));
   RETURN_IF_ERROR(check_same_robot(model, command.model, config, command.config));
-  return problem_at(config, model);
+  Problem problem = config.problem;
+  problem.values = model.values;
+  problem.log = shifted(std::move(problem.log), -model.frame_x_m, -model.frame_y_m);
+  problem.fitness.kind = FitnessKind::kLogScore;
+  problem.spread = {};
+  return problem;
 }
 
 Result<int> run_determine(DetermineCommand& command, CliContext& context) {

@@ -5,18 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/trials/read.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 
 namespace gapfarm {

@@ -2,14 +2,10 @@
 #include "master/ground/horizons.h"
 
 #include <cmath>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/problem/problem.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/ground/paths.h"
 
@@ -22,16 +18,6 @@ struct HorizonsCommand : LongOptions {
   std::vector<double> horizons = {0.5, 2, 5, 0};
   std::string picture;
 };
-
-// Whole runs, before and after, as a picture.
-Status draw_runs(const HorizonsCommand& command, const FittedRuns& fitted, const RunLog& runs,
-                 Farm& farm, Console& console) {
-  if (command.picture.empty()) return {};
-  ASSIGN_OR_RETURN(const auto paths, drive_paths(farm, fitted.problem, fitted.values, runs));
-  RETURN_IF_ERROR(command.outputs.write(command.picture, draw_paths(paths)));
-  console.note("paths drawn in " + command.picture);
-  return {};
-}
 
 Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
@@ -60,7 +46,11 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto horizons,
                    measure_horizons(*farm, fitted.problem, fitted.values, runs,
                                     {command.horizons, fitted.windows.run_in_s}));
-  RETURN_IF_ERROR(draw_runs(command, fitted, runs, *farm, console));
+  if (!command.picture.empty()) {  // whole runs, before and after
+    ASSIGN_OR_RETURN(const auto paths, drive_paths(*farm, fitted.problem, fitted.values, runs));
+    RETURN_IF_ERROR(command.outputs.write(command.picture, draw_paths(paths)));
+    console.note("paths drawn in " + command.picture);
+  }
   if (!command.out.empty()) {
     RETURN_IF_ERROR(command.outputs.write(command.out, windows_csv(horizons)));
   }

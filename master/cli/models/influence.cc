@@ -1,15 +1,10 @@
 // gapfarm influence CONFIG: which parameters move the path further than a repeat does.
-#include "master/experiments/influence/influence.h"
 
 #include <spdlog/fmt/fmt.h>
 
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 
 namespace gapfarm {

@@ -2,8 +2,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <tuple>
@@ -11,11 +9,7 @@
 #include "common/base/ranges.h"
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
-#include "common/trials/read.h"
-#include "common/trials/trial.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/report/prediction_table.h"
 #include "master/run/run.h"

@@ -1,16 +1,10 @@
 // gapfarm simulate CONFIG|MODEL: make a trial log from a parameter set.
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
-#include "common/trials/read.h"
-#include "common/trials/trial.h"
 #include "common/trials/write.h"
 #include "master/cli/models/parameter_options.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/farm/planned_trials.h"
 

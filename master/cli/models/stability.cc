@@ -1,17 +1,11 @@
 // gapfarm stability CONFIG: where tiny changes of the start change the outcome least.
 #include <spdlog/fmt/fmt.h>
 
-#include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/config/config.h"
 #include "common/json/fields.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/long_command.h"
 #include "master/command/outputs.h"
-#include "master/experiments/influence/influence.h"
 
 namespace gapfarm {
 namespace {
@@ -38,16 +32,6 @@ std::string tried_csv(const StabilityReport& report, const Problem& problem) {
   return text;
 }
 
-Status write_all(const StabilityCommand& command, const Config& config,
-                 const StabilityReport& report) {
-  const std::filesystem::path out(command.out);
-  RETURN_IF_ERROR(
-      command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem)));
-  Model model = model_of_problem(config.problem, report.best.values);
-  model.kind = "stable";
-  return command.outputs.write_model((out / "model.toml").string(), model);
-}
-
 Result<int> run_stability(StabilityCommand command, CliContext& context) {
   ASSIGN_OR_RETURN(const Config config,
                    command.traced.open(command.config, &command.settings.trace));
@@ -68,7 +52,12 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
                    command.begin("stability", {{"trace paths"}}, config.farm, context));
   ASSIGN_OR_RETURN(const auto report,
                    find_stability(*asked, config.problem, command.settings, context.work->hooks()));
-  RETURN_IF_ERROR(write_all(command, config, report));
+  const std::filesystem::path out(command.out);
+  RETURN_IF_ERROR(
+      command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem)));
+  Model model = model_of_problem(config.problem, report.best.values);
+  model.kind = "stable";
+  RETURN_IF_ERROR(command.outputs.write_model((out / "model.toml").string(), model));
   const ParameterTable& table = config.problem.table();
   std::string text = fmt::format(
       "spread of the ends over {} repeats, {} points tried\n"
@@ -90,8 +79,7 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
                                 {"best_spread_m", report.best.spread},
                                 {"best_fresh_m", number_or_null(report.best_fresh)},
                                 {"best", values}});
-  context.console.note("wrote: " + (std::filesystem::path(command.out) / "model.toml").string() +
-                       ", stability.csv");
+  context.console.note("wrote: " + (out / "model.toml").string() + ", stability.csv");
   return kExitDone;
 }
 

@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/config/config.h"
 #include "master/cli/completion_scripts.h"
 #include "master/cli/subcommand.h"
@@ -204,6 +202,30 @@ void add_options(const CLI::App& app, std::vector<CompletionCandidate>& found) {
   }
 }
 
+struct CompletionOptions {
+  std::string shell;
+  std::vector<std::string> arguments;
+};
+
+Result<int> print_candidates(const CompletionOptions& options, CliContext& context) {
+  const std::unique_ptr<Program> program = make_program();
+  std::string text;
+  Json list = Json::array();
+  for (const CompletionCandidate& c : completion_candidates(*program->app, options.arguments)) {
+    text += c.word + "\t" + c.summary + "\n";
+    list.push_back({{"word", c.word}, {"summary", c.summary}});
+  }
+  context.console.result(text, list);
+  return kExitDone;
+}
+
+Result<int> run_completion(const CompletionOptions& options, CliContext& context) {
+  if (options.shell == "words") return print_candidates(options, context);
+  const char* script = options.shell == "bash" ? kBash : options.shell == "zsh" ? kZsh : kFish;
+  context.console.result(script, {{"shell", options.shell}, {"script", script}});
+  return kExitDone;
+}
+
 }  // namespace
 
 std::vector<CompletionCandidate> completion_candidates(const CLI::App& app,
@@ -234,34 +256,6 @@ std::vector<CompletionCandidate> completion_candidates(const CLI::App& app,
   std::ranges::sort(found, {}, &CompletionCandidate::word);
   return found;
 }
-
-namespace {
-
-struct CompletionOptions {
-  std::string shell;
-  std::vector<std::string> arguments;
-};
-
-Result<int> print_candidates(const CompletionOptions& options, CliContext& context) {
-  const std::unique_ptr<Program> program = make_program();
-  std::string text;
-  Json list = Json::array();
-  for (const CompletionCandidate& c : completion_candidates(*program->app, options.arguments)) {
-    text += c.word + "\t" + c.summary + "\n";
-    list.push_back({{"word", c.word}, {"summary", c.summary}});
-  }
-  context.console.result(text, list);
-  return kExitDone;
-}
-
-Result<int> run_completion(const CompletionOptions& options, CliContext& context) {
-  if (options.shell == "words") return print_candidates(options, context);
-  const char* script = options.shell == "bash" ? kBash : options.shell == "zsh" ? kZsh : kFish;
-  context.console.result(script, {{"shell", options.shell}, {"script", script}});
-  return kExitDone;
-}
-
-}  // namespace
 
 SubcommandRun setup_completion(CLI::App& app) {
   auto options = std::make_shared<CompletionOptions>();

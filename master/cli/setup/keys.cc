@@ -1,7 +1,6 @@
 // gapfarm keys: who may work for this user's masters.
 #include "common/net/keys.h"
 
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"

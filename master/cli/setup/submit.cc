@@ -1,11 +1,11 @@
 // gapfarm submit: a run's master as a job of the cluster, with its workers as jobs beside it.
+#include <spdlog/fmt/fmt.h>
+
 #include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/text.h"
+#include "common/base/ranges.h"
 #include "common/net/keys.h"
-#include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/cli/evolution/fleet_options.h"
 #include "master/cli/subcommand.h"
@@ -45,30 +45,23 @@ Result<std::string> run_of(std::vector<std::string>* values) {
 // is queued again and resumes it.  A cluster that queues it again itself sends TERM.
 std::string master_script(const std::string& run, const std::string& evolve,
                           const std::string& resume, const std::string& requeue) {
-  return "#!/bin/sh\n"
-         "again= child=\n"
-         "trap 'again=yes; [ -z \"$child\" ] || kill -TERM \"$child\"' USR1 USR2\n"
-         "trap '[ -z \"$child\" ] || kill -TERM \"$child\"' TERM\n"
-         "cd " +
-         shell_quoted(std::filesystem::current_path().string()) +
-         " || exit 1\n"
-         "if [ -e " +
-         shell_quoted(run + "/run.sqlite") +
-         " ]; then\n"
-         "  (trap '' USR1 USR2; exec " +
-         resume +
-         ") &\n"
-         "else\n"
-         "  (trap '' USR1 USR2; exec " +
-         evolve +
-         ") &\n"
-         "fi\n"
-         "child=$!\n"
-         "while kill -0 \"$child\" 2>/dev/null; do wait \"$child\"; status=$?; done\n"
-         "if [ -n \"$again\" ] && [ \"$status\" -eq 85 ]; then " +
-         requeue +
-         "; fi\n"
-         "exit \"$status\"\n";
+  return fmt::format(
+      "#!/bin/sh\n"
+      "again= child=\n"
+      "trap 'again=yes; [ -z \"$child\" ] || kill -TERM \"$child\"' USR1 USR2\n"
+      "trap '[ -z \"$child\" ] || kill -TERM \"$child\"' TERM\n"
+      "cd {} || exit 1\n"
+      "if [ -e {} ]; then\n"
+      "  (trap '' USR1 USR2; exec {}) &\n"
+      "else\n"
+      "  (trap '' USR1 USR2; exec {}) &\n"
+      "fi\n"
+      "child=$!\n"
+      "while kill -0 \"$child\" 2>/dev/null; do wait \"$child\"; status=$?; done\n"
+      "if [ -n \"$again\" ] && [ \"$status\" -eq 85 ]; then {}; fi\n"
+      "exit \"$status\"\n",
+      shell_quoted(std::filesystem::current_path().string()), shell_quoted(run + "/run.sqlite"),
+      resume, evolve, requeue);
 }
 
 Result<int> run_submit(SubmitCommand command, CliContext& context) {
@@ -89,12 +82,11 @@ Result<int> run_submit(SubmitCommand command, CliContext& context) {
     farm.insert(farm.end(), {"--insecure", "--insecure-anywhere"});
   else
     farm.insert(farm.end(), {"--keys", std::filesystem::absolute(command.keys).string()});
-  const std::vector<std::string> fleet = command.fleet.arguments("--workers-on");
-  farm.insert(farm.end(), fleet.begin(), fleet.end());
+  append(farm, command.fleet.arguments("--workers-on"));
   std::vector<std::string> evolve = {self}, resume = {self, "resume", run};
-  evolve.insert(evolve.end(), command.evolve.begin(), command.evolve.end());
-  evolve.insert(evolve.end(), farm.begin(), farm.end());
-  resume.insert(resume.end(), farm.begin(), farm.end());
+  append(evolve, command.evolve);
+  append(evolve, farm);
+  append(resume, farm);
   const std::string script = master_script(run, quoted(evolve), quoted(resume), site.requeue);
 
   const std::string logs = std::filesystem::absolute(command.fleet.logs).string();

@@ -1,9 +1,8 @@
 // gapfarm workers: workers from the cluster that is there, as many as there is work for.
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
-#include "common/base/text.h"
+#include "common/base/ranges.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
 #include "master/cli/evolution/fleet_options.h"
@@ -51,8 +50,7 @@ Result<std::string> endpoint_of(const WorkersCommand& command) {
 }
 
 Result<int> run_workers(WorkersCommand command, CliContext& context) {
-  command.fleet.extra.insert(command.fleet.extra.end(), command.options.begin(),
-                             command.options.end());
+  append(command.fleet.extra, command.options);
   ASSIGN_OR_RETURN(const std::string endpoint, endpoint_of(command));
   ASSIGN_OR_RETURN(FleetLoopOptions options,
                    fleet_of(command.fleet, endpoint, command.keys, command.insecure));

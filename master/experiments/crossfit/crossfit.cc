@@ -32,8 +32,7 @@ std::vector<Pose> mean_of_repeats(const TrialLog& log,
   std::map<std::vector<std::string>, Eigen::Vector4d> sums;  // x, y, cos, sin
   std::vector<std::vector<std::string>> keys;
   for (const Trial& trial : log.trials) {
-    std::vector<std::string> key;
-    for (const TrialColumnReader& column : columns) key.push_back(column(trial));
+    auto key = mapped(columns, [&](const TrialColumnReader& column) { return column(trial); });
     const Pose& X = trial.X_WE;
     const auto [entry, fresh] = sums.try_emplace(key, Eigen::Vector4d::Zero());
     entry->second += Eigen::Vector4d(X.x, X.y, std::cos(X.theta), std::sin(X.theta));

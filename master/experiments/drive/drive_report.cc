@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "common/base/ranges.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
 #include "master/experiments/drive/drive.h"

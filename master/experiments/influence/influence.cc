@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/text.h"
 #include "common/math/rank_tests.h"
 #include "common/random/stream.h"
 
@@ -53,6 +54,11 @@ class InfluenceStudy {
     return a.ok && b.ok ? set_distance(a, b, distance_, samples_) : kFailed_m;
   }
 
+  std::vector<double> repeat_distances() const {
+    return mapped(indices(settings_.repeats),
+                  [&](std::size_t r) { return apart(repeats_[r], others_[r]); });
+  }
+
   // Later stages trace only to the horizon.
   void plan() const {
     const std::uint64_t traces = traces_of_a_set(problem_, settings_.trace);
@@ -78,8 +84,7 @@ class InfluenceStudy {
     repeats_.assign(sets.begin() + 1, sets.begin() + 1 + settings_.repeats);
     others_.assign(sets.begin() + 1 + settings_.repeats, sets.end());
     choose_horizon();
-    for (unsigned r = 0; r < settings_.repeats; ++r)
-      noise_.push_back(apart(repeats_[r], others_[r]));
+    noise_ = repeat_distances();
     report_.repeat_distance = median(noise_);
     report_.repeat_95 = {quantile(noise_, 0.025), quantile(noise_, 0.975)};
     return {};
@@ -98,11 +103,7 @@ class InfluenceStudy {
     for (int i = 1; i <= kHorizons; ++i) {
       HorizonPoint point{longest_s * i / kHorizons, 0, 0};
       samples_ = samples_of(point.horizon_s);
-      std::vector<double> distances;
-      for (unsigned r = 0; r < settings_.repeats; ++r) {
-        distances.push_back(apart(repeats_[r], others_[r]));
-      }
-      point.repeat_distance = median(distances);
+      point.repeat_distance = median(repeat_distances());
       point.extent = set_extent(nominal_, samples_);
       // Before a finger touches its piece the noise of the start is all there is.
       const double share = point.repeat_distance / std::max(point.extent, kLeast_m);
@@ -122,13 +123,11 @@ class InfluenceStudy {
   // Different values of the gene over its range, without the standard's.
   std::vector<double> levels_of(const Gene& gene) const {
     const Parameter& row = problem_.table()[gene.row];
-    std::size_t count = settings_.levels;
-    if (row.kind != ParameterKind::kReal) {
-      count = std::min<std::size_t>(count, static_cast<std::size_t>(gene.upper - gene.lower) + 1);
-      if (row.kind == ParameterKind::kChoice) {
-        count = static_cast<std::size_t>(gene.upper - gene.lower) + 1;
-      }
-    }
+    const auto all = static_cast<std::size_t>(gene.upper - gene.lower) + 1;  // of whole numbers
+    const std::size_t count = row.kind == ParameterKind::kChoice ? all
+                              : row.kind == ParameterKind::kReal
+                                  ? settings_.levels
+                                  : std::min<std::size_t>(settings_.levels, all);
     std::vector<double> levels;
     for (std::size_t k = 0; k < count; ++k) {
       const double g = count == 1 ? 0 : static_cast<double>(k) / static_cast<double>(count - 1);
@@ -279,6 +278,21 @@ class InfluenceStudy {
   std::size_t samples_ = 0;
 };
 
+std::string distance_text(double distance_m) {
+  return distance_m >= 1e5 ? std::string("fails") : fmt::format("{:.3g}", distance_m);
+}
+
+std::string interval_text(const Interval& interval) {
+  if (std::isnan(interval.lower)) return "-";
+  return distance_text(interval.lower) + " to " + distance_text(interval.upper);
+}
+
+// The value without its unit, as TOML has it.
+std::string toml_value(const ParameterTable& table, std::size_t row, double value) {
+  const std::string text = table.text_of(row, value);
+  return table[row].kind == ParameterKind::kChoice ? '"' + text + '"' : text;
+}
+
 }  // namespace
 
 Result<InfluenceReport> find_influence(Farm& farm, const Problem& problem,
@@ -296,25 +310,6 @@ std::vector<Gene> all_base_genes(const ParameterTable& table) {
   }
   return genes;
 }
-
-namespace {
-
-std::string distance_text(double distance_m) {
-  return distance_m >= 1e5 ? std::string("fails") : fmt::format("{:.3g}", distance_m);
-}
-
-std::string interval_text(const Interval& interval) {
-  if (std::isnan(interval.lower)) return "-";
-  return distance_text(interval.lower) + " to " + distance_text(interval.upper);
-}
-
-// The value without its unit, as TOML has it.
-std::string toml_value(const ParameterTable& table, std::size_t row, double value) {
-  const std::string text = table.text_of(row, value);
-  return table[row].kind == ParameterKind::kChoice ? '"' + text + '"' : text;
-}
-
-}  // namespace
 
 std::string influence_text(const InfluenceReport& report, const ParameterTable& table) {
   std::string text = fmt::format(
@@ -361,16 +356,13 @@ std::string influential_genes(const InfluenceReport& report, const ParameterTabl
   for (const FactorInfluence& f : report.factors) {
     if (!f.influential()) continue;
     const Parameter& parameter = table[f.gene.row];
-    std::string range = "[" + toml_value(table, f.gene.row, f.gene.lower) + ", " +
-                        toml_value(table, f.gene.row, f.gene.upper) + "]";
+    std::vector<double> listed = {f.gene.lower, f.gene.upper};
     if (parameter.kind == ParameterKind::kChoice) {
-      range = "[";
-      for (double choice = f.gene.lower; choice <= f.gene.upper; ++choice) {
-        range += (range.size() > 1 ? ", " : "") + toml_value(table, f.gene.row, choice);
-      }
-      range += "]";
+      listed.clear();
+      for (double choice = f.gene.lower; choice <= f.gene.upper; ++choice) listed.push_back(choice);
     }
-    text += parameter.key + " = " + range;
+    const auto toml = [&](double value) { return toml_value(table, f.gene.row, value); };
+    text += parameter.key + " = [" + joined(listed, ", ", toml) + "]";
     if (parameter.unit != "-") text += "  # " + parameter.unit;
     text += "\n";
   }

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/ranges.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 #include "master/experiments/influence/influence.h"
@@ -49,6 +48,32 @@ v1::Task trace_task(const TraceRequest& request, const Traced& traced, std::size
 
 std::span<const PathPoint> first(const std::vector<PathPoint>& path, std::size_t samples) {
   return std::span(path).first(std::min(samples, path.size()));
+}
+
+constexpr std::uint64_t kFreshNoise = 1u << 20;
+constexpr int kMostIdleRounds = 100;
+
+// Spread at each genome; an empty genome stands for the problem's own values.
+Result<std::vector<std::optional<double>>> spreads_at(Farm& farm, const Problem& problem,
+                                                      const StabilitySettings& settings,
+                                                      const std::vector<Genome>& genomes,
+                                                      std::uint64_t first_repeat) {
+  std::vector<TraceRequest> requests;
+  for (const Genome& genome : genomes) {
+    for (unsigned r = 0; r < settings.repeats; ++r) {
+      requests.push_back({overrides_of(problem.table(), problem.genes, genome), first_repeat + r});
+    }
+  }
+  ASSIGN_OR_RETURN(const auto sets, trace_paths(farm, problem, settings.trace, requests));
+  return mapped(indices(genomes.size()), [&](std::size_t i) {
+    return end_spread(std::span(sets).subspan(i * settings.repeats, settings.repeats));
+  });
+}
+
+std::vector<Score> scores_of(const std::vector<std::optional<double>>& spreads) {
+  return mapped(spreads, [](const auto& spread) {
+    return Score{spread ? v1::OK : v1::DIVERGED, spread.value_or(0)};
+  });
 }
 
 }  // namespace
@@ -115,36 +140,6 @@ double set_extent(const PathSet& set, std::size_t samples) {
   }
   return extent;
 }
-
-namespace {
-
-constexpr std::uint64_t kFreshNoise = 1u << 20;
-constexpr int kMostIdleRounds = 100;
-
-// Spread at each genome; an empty genome stands for the problem's own values.
-Result<std::vector<std::optional<double>>> spreads_at(Farm& farm, const Problem& problem,
-                                                      const StabilitySettings& settings,
-                                                      const std::vector<Genome>& genomes,
-                                                      std::uint64_t first_repeat) {
-  std::vector<TraceRequest> requests;
-  for (const Genome& genome : genomes) {
-    for (unsigned r = 0; r < settings.repeats; ++r) {
-      requests.push_back({overrides_of(problem.table(), problem.genes, genome), first_repeat + r});
-    }
-  }
-  ASSIGN_OR_RETURN(const auto sets, trace_paths(farm, problem, settings.trace, requests));
-  return mapped(indices(genomes.size()), [&](std::size_t i) {
-    return end_spread(std::span(sets).subspan(i * settings.repeats, settings.repeats));
-  });
-}
-
-std::vector<Score> scores_of(const std::vector<std::optional<double>>& spreads) {
-  return mapped(spreads, [](const auto& spread) {
-    return Score{spread ? v1::OK : v1::DIVERGED, spread.value_or(0)};
-  });
-}
-
-}  // namespace
 
 std::optional<double> end_spread(std::span<const PathSet> repeats) {
   double squares = 0;

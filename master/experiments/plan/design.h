@@ -3,17 +3,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
 
-#include "common/base/result.h"
 #include "common/config/settings.h"
-#include "common/problem/problem.h"
 #include "common/progress/overall_progress.h"
-#include "common/trials/trial.h"
 #include "master/experiments/plan/visibility.h"
-#include "master/farm/farm.h"
 
 namespace gapfarm::plan {
 

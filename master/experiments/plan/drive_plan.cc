@@ -1,10 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
-#include "common/base/ranges.h"
-#include "common/base/text.h"
 #include "common/random/stream.h"
 #include "master/experiments/plan/drive_knowledge.h"
 #include "master/experiments/plan/visibility.h"

@@ -128,19 +128,78 @@ void find_like(const ParameterTable& table, const Signals& signals,
                const std::vector<const Shift*>& own, Visibility* seen) {
   for (const auto& [other, shifts] : by_effect(signals)) {
     if (other == own.front()->draw.effect) continue;
-    std::vector<double> greatest;
-    for (const Shift* a : own) {
-      double most = 0;
-      for (const Shift* b : shifts) {
-        most = std::max(most, std::abs(plan::likeness(a->rows, b->rows, signals.nuisances)));
-      }
-      greatest.push_back(most);
-    }
-    const double typical = median(greatest);
+    const double typical = median(mapped(own, [&](const Shift* a) {
+      return max_of(shifts, [&](const Shift* b) {
+        return std::abs(plan::likeness(a->rows, b->rows, signals.nuisances));
+      });
+    }));
     if (typical <= seen->likeness) continue;
     seen->likeness = typical;
     seen->like = table.effects()[other].name;
   }
+}
+
+constexpr int kSteps = 200;            // of Frank and Wolfe; each brings the bound nearer
+constexpr double kCloseEnough = 1e-3;  // nats an unknown
+
+// Of all unknowns' information M, what is left of the first ones' once the others are allowed for
+// (Schur's complement), and the map whose congruence takes any other information to at least that.
+struct Allowed {
+  Eigen::MatrixXd S, L;
+};
+
+Allowed allowed_for(const Eigen::MatrixXd& M, Eigen::Index nuisances) {
+  const Eigen::Index s = M.rows() - nuisances;
+  Allowed a;
+  a.L = Eigen::MatrixXd::Zero(s, M.rows());
+  a.L.leftCols(s).setIdentity();
+  if (nuisances > 0) {
+    a.L.rightCols(nuisances) = -M.bottomRightCorner(nuisances, nuisances)
+                                    .llt()
+                                    .solve(M.bottomLeftCorner(nuisances, s))
+                                    .transpose();
+  }
+  a.S = a.L * M * a.L.transpose();
+  return a;
+}
+
+// Of the information M: its value, and the slope that bounds those of others.
+struct Criterion {
+  double value = 0;
+  Eigen::MatrixXd slope;
+};
+
+double log_det(const Eigen::MatrixXd& S) {
+  return 2 * S.llt().matrixLLT().diagonal().array().log().sum();
+}
+
+// Frank and Wolfe's steps: `criterion` of information M is a concave sum of `size` logarithms, and
+// that of any other M* is at most its value and size log(|M*^1/2 slope|^2 / size).  That is linear
+// in M*, so no M* of `times` experiments has more than `times` the best of them.
+double best_over(const std::vector<Rows>& candidates, double times, double size,
+                 const std::function<Criterion(const Eigen::MatrixXd&)>& criterion,
+                 Eigen::MatrixXd M, double planned) {
+  const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(M.rows(), M.cols());
+  double bound = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kSteps; ++k) {
+    const Criterion at = criterion(M);
+    std::size_t best = 0;
+    double most = -1;
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      const double gain = (candidates[c] * at.slope).squaredNorm();
+      if (gain <= most) continue;
+      most = gain;
+      best = c;
+    }
+    const double ahead = at.value - planned;
+    const double share = (at.slope.squaredNorm() + times * most) / size;
+    bound = std::min(bound, ahead + size * std::log(share));
+    if (bound - ahead < kCloseEnough * size) break;
+    const double step = 2.0 / (k + 3);
+    const Eigen::MatrixXd there = prior + times * candidates[best].transpose() * candidates[best];
+    M = (1 - step) * M + step * there;
+  }
+  return std::exp(std::min(0.0, -bound / (2 * size)));
 }
 
 }  // namespace
@@ -270,73 +329,6 @@ double likeness(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
 }
 
 // How much better a plan could be at most.
-
-namespace {
-
-constexpr int kSteps = 200;            // of Frank and Wolfe; each brings the bound nearer
-constexpr double kCloseEnough = 1e-3;  // nats an unknown
-
-// Of all unknowns' information M, what is left of the first ones' once the others are allowed for
-// (Schur's complement), and the map whose congruence takes any other information to at least that.
-struct Allowed {
-  Eigen::MatrixXd S, L;
-};
-
-Allowed allowed_for(const Eigen::MatrixXd& M, Eigen::Index nuisances) {
-  const Eigen::Index s = M.rows() - nuisances;
-  Allowed a;
-  a.L = Eigen::MatrixXd::Zero(s, M.rows());
-  a.L.leftCols(s).setIdentity();
-  if (nuisances > 0) {
-    a.L.rightCols(nuisances) = -M.bottomRightCorner(nuisances, nuisances)
-                                    .llt()
-                                    .solve(M.bottomLeftCorner(nuisances, s))
-                                    .transpose();
-  }
-  a.S = a.L * M * a.L.transpose();
-  return a;
-}
-
-// Of the information M: its value, and the slope that bounds those of others.
-struct Criterion {
-  double value = 0;
-  Eigen::MatrixXd slope;
-};
-
-double log_det(const Eigen::MatrixXd& S) {
-  return 2 * S.llt().matrixLLT().diagonal().array().log().sum();
-}
-
-// Frank and Wolfe's steps: `criterion` of information M is a concave sum of `size` logarithms, and
-// that of any other M* is at most its value and size log(|M*^1/2 slope|^2 / size).  That is linear
-// in M*, so no M* of `times` experiments has more than `times` the best of them.
-double best_over(const std::vector<Rows>& candidates, double times, double size,
-                 const std::function<Criterion(const Eigen::MatrixXd&)>& criterion,
-                 Eigen::MatrixXd M, double planned) {
-  const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(M.rows(), M.cols());
-  double bound = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < kSteps; ++k) {
-    const Criterion at = criterion(M);
-    std::size_t best = 0;
-    double most = -1;
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
-      const double gain = (candidates[c] * at.slope).squaredNorm();
-      if (gain <= most) continue;
-      most = gain;
-      best = c;
-    }
-    const double ahead = at.value - planned;
-    const double share = (at.slope.squaredNorm() + times * most) / size;
-    bound = std::min(bound, ahead + size * std::log(share));
-    if (bound - ahead < kCloseEnough * size) break;
-    const double step = 2.0 / (k + 3);
-    const Eigen::MatrixXd there = prior + times * candidates[best].transpose() * candidates[best];
-    M = (1 - step) * M + step * there;
-  }
-  return std::exp(std::min(0.0, -bound / (2 * size)));
-}
-
-}  // namespace
 
 // Schur's complement of any M* is at most L M* L' for the L of any M, so that its log det is at
 // most that of M's plus s log(tr(S^-1 L M* L') / s): determinants of a trace are greatest where all
