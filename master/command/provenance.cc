@@ -6,6 +6,7 @@
 #include "common/base/text.h"
 #include "common/json/fields.h"
 #include "common/trials/files.h"
+#include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
 namespace {
