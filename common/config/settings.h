@@ -87,7 +87,7 @@ struct EvolutionSettings {
   std::optional<std::uint64_t> stagnation_generations;  // without improvement
   // Restart (keeping the elites) after so many generations without improvement; none: never.
   std::optional<std::uint64_t> restart_generations;
-  // The population in so many islands that wait for nobody else (master/evolve/islands.h).
+  // The population in so many islands that wait for nobody else (master/evolve/optimisers.h).
   unsigned islands = 1;
   bool asynchronous = false;  // as many islands as the population has room for
   SearchStart start = {};

@@ -1,8 +1,8 @@
-#include "master/evolve/gene_space.h"
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+
+#include "master/evolve/individual.h"
 
 namespace gapfarm {
 namespace {

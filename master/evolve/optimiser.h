@@ -55,7 +55,27 @@ struct NamedNumber {
   double value = 0;
 };
 
-class Islands;
+// The islands of an Optimiser; for who drives them one by one instead of by ask() and tell().
+// Meanwhile the Optimiser itself shows the last generation that advance() has reached.
+class Islands {
+ public:
+  virtual ~Islands() = default;
+
+  // What an island asks for, a generation of it.
+  struct Lot {
+    std::size_t island = 0;
+    std::vector<Candidate> candidates;  // at least one
+  };
+  // Begins a generation, none after `last`, on every island that has none under way and needs
+  // nothing that others do not have yet.
+  virtual std::vector<Lot> begin(std::uint64_t last) = 0;
+  // Scores in the order of the island's lot; completes its generation.
+  virtual void tell_island(std::size_t island, std::span<const Score> scores) = 0;
+  // The Optimiser goes on to its next generation.  False: some island has not completed it.
+  virtual bool advance() = 0;
+  // Births of a generation, of all islands.
+  virtual std::uint64_t population() const = 0;
+};
 
 class Optimiser {
  public:

@@ -3,10 +3,9 @@
 #include <array>
 #include <cassert>
 
-#include "master/evolve/islands.h"
 #include "master/evolve/methods/cma_es.h"
 #include "master/evolve/methods/differential_evolution.h"
-#include "master/evolve/methods/search_optimiser.h"
+#include "master/evolve/methods/search_method.h"
 
 namespace gapfarm {
 
@@ -27,8 +26,7 @@ Result<std::unique_ptr<Optimiser>> make(const OptimiserSetup& setup) {
                            most_evaluations(settings, setup.genes.size()),
                            setup.given};
   const auto row = static_cast<std::size_t>(settings.optimiser.kind);
-  return std::unique_ptr<Optimiser>(
-      std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method)));
+  return make_search(optimisers()[row].name, setup, make_method(method));
 }
 
 }  // namespace

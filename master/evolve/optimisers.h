@@ -29,11 +29,25 @@ unsigned population_of(const EvolutionSettings& settings, std::size_t genes);
 // That a run can come to at most, by its limits in evaluations and generations.
 std::uint64_t most_evaluations(const EvolutionSettings& settings, std::size_t genes);
 
-// The optimiser that the setup's settings name.  Errors: no genes, a nominal genome of another
-// length, and what the optimiser itself has to say (genetic.h).
-Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup);
+// Islands: several populations, each an optimiser of its own over the same genes, that wait for one
+// another as little as possible.  Before each generation an island meets one or two others as they
+// were a generation or two before, near and far by turns (steps of 1, 2, 4, ... round a ring).
+// What it learns from them is its method's: Optimiser::meet().
+//
+// No order in which results arrive shows: what an island does follows from its own results and
+// from those that other islands had at stated generations.  So whoever drives islands may let each
+// go on as soon as its own generation is complete.
+//
+// Into how many islands the setup's population goes; 1: it stays whole.  Errors: a method that
+// cannot be split, a population too small for it.
+Result<unsigned> island_count(const OptimiserSetup& setup);
 
-// Stages: an optimiser over some of the genes, then one over others, each from the best so far.
+// REQUIRES: island_count() is above 1.  Errors: as make_optimiser().
+Result<std::unique_ptr<Optimiser>> make_islands(const OptimiserSetup& setup);
+
+// The optimiser that the setup's settings name.  Errors: no genes, a nominal genome of another
+// length, and what the optimiser itself has to say.
+Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup);
 
 // Every stage is a run of the setup's optimiser over its genes, with draws of its own; the others
 // keep the values of the best genome of the stages before, which is the first candidate (unless
@@ -45,8 +59,6 @@ Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
 // The best genomes of the completed stages, in order, out of a state of `genes` genes; empty when
 // the state is not a staged optimiser's.
 std::vector<Genome> stage_results(std::string_view state, std::size_t genes);
-
-// The searches by populations and operators: of one cost, and of several objectives.
 
 // A genetic algorithm with elitism, self-adapted operators and restarts.
 //

@@ -8,7 +8,6 @@
 
 #include "common/base/ranges.h"
 #include "common/trials/read.h"
-#include "master/evolve/islands.h"
 #include "master/evolve/optimisers.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/simulated_start.h"

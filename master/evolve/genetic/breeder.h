@@ -7,7 +7,6 @@
 
 #include "common/config/settings.h"
 #include "common/random/stream.h"
-#include "master/evolve/gene_space.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {

@@ -70,12 +70,66 @@ class Nsga2 final : public CountingOptimiser {
     }
   }
 
-  std::vector<Candidate> ask() override;
-  void tell(std::span<const Score> scores) override;
+  std::vector<Candidate> ask() override {
+    if (!plan_) plan_ = plan_generation();
+    return plan_->candidates;
+  }
 
-  std::vector<NamedNumber> operator_probabilities() const override;
-  std::string state() const override;
-  Status restore(std::string_view state) override;
+  void tell(std::span<const Score> scores) override {
+    assert(plan_ && scores.size() == plan_->candidates.size());
+    Plan plan = std::move(*plan_);
+    plan_.reset();
+    auto next = scores.begin();
+    for (const std::size_t i : plan.rescored) population_[i].standing.add(*next++);
+    for (Individual& child : plan.children) child.standing.add(*next++);
+    ++generation_;
+    evaluations_ += scores.size();
+    next_birth_id_ += plan.births;
+    // Progress is what beats a member of the front; where there was none, what is best.
+    const std::size_t compared =
+        std::max(front_size_, std::min<std::size_t>(1, population_.size()));
+    const bool first = population_.empty();
+    for (const Individual& child : plan.children) {
+      for (std::size_t i = 0; i < compared; ++i) {
+        if (beats(child, population_[i])) last_improvement_ = generation_;
+      }
+    }
+    if (first) last_improvement_ = generation_;
+    std::vector<Individual> all = std::move(population_);
+    for (Individual& child : plan.children) all.push_back(std::move(child));
+    select(std::move(all));
+  }
+
+  std::vector<NamedNumber> operator_probabilities() const override {
+    std::vector<NamedNumber> figures = {{"front", static_cast<double>(front_size_)}};
+    if (reference_.size() > kMostHypervolumeCosts) return figures;
+    figures.push_back({"hypervolume", reference_.empty() ? 0 : hypervolume(front(), reference_)});
+    return figures;
+  }
+
+  std::string state() const override {
+    assert(!plan_ && "save between tell() and ask()");
+    v1::GeneticState message;
+    save_counts(false, message);
+    message.mutable_reference()->Add(reference_.begin(), reference_.end());
+    return message.SerializeAsString();
+  }
+
+  Status restore(std::string_view state) override {
+    ASSIGN_OR_RETURN(const auto message, parse_state<v1::GeneticState>(state));
+    RETURN_IF_ERROR(restore_counts(false, message));
+    reference_.assign(message.reference().begin(), message.reference().end());
+    const std::vector<Costs> ended_well = costs_of_all();
+    if (std::ranges::any_of(
+            ended_well, [&](const Costs& costs) { return costs.size() != reference_.size(); })) {
+      return Error{
+          "the saved optimiser state is damaged or of other objectives; resume with the "
+          "config of the run"};
+    }
+    front_size_ = first_front(ended_well).size();
+    if (!population_.empty()) note_best();
+    return {};
+  }
 
  private:
   struct Plan {
@@ -85,15 +139,124 @@ class Nsga2 final : public CountingOptimiser {
     std::vector<Candidate> candidates;
   };
 
-  Plan plan_generation() const;
-  void add_pair(Plan& plan, std::set<Genome>& known) const;
-  void mutate(Individual& child, bool must, Stream& stream) const;
-  std::size_t tournament(Stream& stream) const;
-  void select(std::vector<Individual> all);
-  void take(std::vector<Individual> front);
-  std::vector<Costs> front() const;
-  std::vector<Costs> costs_of_all() const;  // that ended well
-  void note_best();
+  Plan plan_generation() const {
+    Plan plan;
+    for (std::size_t i = 0; i < front_size_; ++i) {
+      const Individual& member = population_[i];
+      if (member.standing.scores >= full_scores_) continue;
+      plan.rescored.push_back(i);
+      plan.candidates.push_back({member.birth_id, member.standing.scores, member.genome});
+    }
+    std::set<Genome> known;
+    for (const Individual& member : population_) known.insert(member.genome);
+    while (plan.births < size_) add_pair(plan, known);
+    for (const Individual& child : plan.children) {
+      plan.candidates.push_back({child.birth_id, 0, child.genome});
+    }
+    return plan;
+  }
+
+  void add_pair(Plan& plan, std::set<Genome>& known) const {
+    const std::uint64_t birth_id = next_birth_id_ + plan.births;
+    Stream stream = stream_of(birth_id);
+    Individual pair[2];
+    if (!population_.empty()) {
+      const Individual& a = population_[tournament(stream)];
+      const Individual& b = population_[tournament(stream)];
+      pair[0].genome = a.genome, pair[1].genome = b.genome;
+      pair[0].parents = {a.birth_id}, pair[1].parents = {b.birth_id};
+      if (a.birth_id != b.birth_id && stream.bernoulli(kCrossover)) {
+        cross(space_, pair[0].genome, pair[1].genome, stream);
+        pair[0].parents = pair[1].parents = {a.birth_id, b.birth_id};
+        pair[0].origin = pair[1].origin = kSimulatedBinary;
+      }
+    }
+    for (Individual& child : pair) {
+      child.birth_id = next_birth_id_ + plan.births++;
+      bool fresh = false;
+      for (unsigned t = 0; t < kTries && !fresh; ++t) {
+        if (population_.empty()) {
+          const bool given = child.birth_id < given_.size() && t == 0;
+          child.genome = given ? given_[child.birth_id] : space_.random(stream);
+          child.origin = !given ? kRandom : child.birth_id == 0 ? kNominal : kGiven;
+        } else {
+          mutate(child, t > 0, stream);
+        }
+        child.genome = space_.snapped(child.genome);
+        fresh = known.insert(child.genome).second;
+      }
+      if (fresh && plan.children.size() < size_) plan.children.push_back(std::move(child));
+    }
+  }
+
+  void mutate(Individual& child, bool must, Stream& stream) const {
+    const std::size_t certain = must ? stream.below(space_.size()) : space_.size();
+    for (std::size_t gene = 0; gene < space_.size(); ++gene) {
+      if (!stream.bernoulli(1 / static_cast<double>(space_.size())) && gene != certain) continue;
+      double& g = child.genome[gene];
+      g = space_[gene].shape == GeneShape::kReal
+              ? std::clamp(polynomial(g, stream.uniform()), 0.0, 1.0)
+              : space_.stepped(gene, g, kStep, stream);
+      child.origin |= kPolynomial;
+    }
+  }
+
+  std::size_t tournament(Stream& stream) const {
+    const std::size_t a = stream.below(population_.size());
+    return std::min<std::size_t>(a, stream.below(population_.size()));
+  }
+
+  // The best `size_` by fronts, the last front by crowding.
+  void select(std::vector<Individual> all) {
+    const std::vector<std::size_t> numbers = front_numbers(
+        all.size(), [&](std::size_t a, std::size_t b) { return beats(all[a], all[b]); });
+    std::vector<std::vector<Individual>> fronts(
+        numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1);
+    for (std::size_t i = 0; i < all.size(); ++i) fronts[numbers[i]].push_back(std::move(all[i]));
+    population_.clear();
+    front_size_ = 0;
+    for (std::vector<Individual>& front : fronts) {
+      if (population_.size() == size_) break;
+      take(std::move(front));
+      const bool ended_well = population_.front().standing.outcome == v1::OK;
+      if (front_size_ == 0 && ended_well) front_size_ = population_.size();
+    }
+    note_best();
+  }
+
+  void take(std::vector<Individual> front) {
+    std::ranges::sort(front, {}, &Individual::birth_id);
+    const std::size_t room = size_ - population_.size();
+    std::vector<Costs> costs = mapped(front, costs_of);
+    std::vector<double> distances = crowding_distances(costs);
+    while (front.size() > room) {
+      const auto least = std::ranges::min_element(distances) - distances.begin();
+      front.erase(front.begin() + least);
+      costs.erase(costs.begin() + least);
+      distances = crowding_distances(costs);
+    }
+    for (const std::size_t i : order_of(distances, std::greater<>())) {
+      population_.push_back(std::move(front[i]));
+    }
+  }
+
+  std::vector<Costs> front() const {
+    return mapped(std::span(population_).first(front_size_), costs_of);
+  }
+
+  // that ended well
+  std::vector<Costs> costs_of_all() const {
+    return filtered(
+        population_, [](const Individual& one) { return one.standing.outcome == v1::OK; },
+        costs_of);
+  }
+
+  void note_best() {
+    const std::vector<Costs> best = front();
+    best_ = population_[best.empty() ? 0 : knee_of(best)];
+    if (!reference_.empty() || best.empty()) return;
+    reference_ = greatest_of(costs_of_all());
+  }
 
   std::vector<Genome> given_;  // of the first generation
   std::size_t size_;
@@ -102,183 +265,6 @@ class Nsga2 final : public CountingOptimiser {
   Costs reference_;             // empty: nothing ended well yet
   std::optional<Plan> plan_;
 };
-
-std::vector<Candidate> Nsga2::ask() {
-  if (!plan_) plan_ = plan_generation();
-  return plan_->candidates;
-}
-
-std::size_t Nsga2::tournament(Stream& stream) const {
-  const std::size_t a = stream.below(population_.size());
-  return std::min<std::size_t>(a, stream.below(population_.size()));
-}
-
-void Nsga2::mutate(Individual& child, bool must, Stream& stream) const {
-  const std::size_t certain = must ? stream.below(space_.size()) : space_.size();
-  for (std::size_t gene = 0; gene < space_.size(); ++gene) {
-    if (!stream.bernoulli(1 / static_cast<double>(space_.size())) && gene != certain) continue;
-    double& g = child.genome[gene];
-    g = space_[gene].shape == GeneShape::kReal
-            ? std::clamp(polynomial(g, stream.uniform()), 0.0, 1.0)
-            : space_.stepped(gene, g, kStep, stream);
-    child.origin |= kPolynomial;
-  }
-}
-
-void Nsga2::add_pair(Plan& plan, std::set<Genome>& known) const {
-  const std::uint64_t birth_id = next_birth_id_ + plan.births;
-  Stream stream = stream_of(birth_id);
-  Individual pair[2];
-  if (!population_.empty()) {
-    const Individual& a = population_[tournament(stream)];
-    const Individual& b = population_[tournament(stream)];
-    pair[0].genome = a.genome, pair[1].genome = b.genome;
-    pair[0].parents = {a.birth_id}, pair[1].parents = {b.birth_id};
-    if (a.birth_id != b.birth_id && stream.bernoulli(kCrossover)) {
-      cross(space_, pair[0].genome, pair[1].genome, stream);
-      pair[0].parents = pair[1].parents = {a.birth_id, b.birth_id};
-      pair[0].origin = pair[1].origin = kSimulatedBinary;
-    }
-  }
-  for (Individual& child : pair) {
-    child.birth_id = next_birth_id_ + plan.births++;
-    bool fresh = false;
-    for (unsigned t = 0; t < kTries && !fresh; ++t) {
-      if (population_.empty()) {
-        const bool given = child.birth_id < given_.size() && t == 0;
-        child.genome = given ? given_[child.birth_id] : space_.random(stream);
-        child.origin = !given ? kRandom : child.birth_id == 0 ? kNominal : kGiven;
-      } else {
-        mutate(child, t > 0, stream);
-      }
-      child.genome = space_.snapped(child.genome);
-      fresh = known.insert(child.genome).second;
-    }
-    if (fresh && plan.children.size() < size_) plan.children.push_back(std::move(child));
-  }
-}
-
-Nsga2::Plan Nsga2::plan_generation() const {
-  Plan plan;
-  for (std::size_t i = 0; i < front_size_; ++i) {
-    const Individual& member = population_[i];
-    if (member.standing.scores >= full_scores_) continue;
-    plan.rescored.push_back(i);
-    plan.candidates.push_back({member.birth_id, member.standing.scores, member.genome});
-  }
-  std::set<Genome> known;
-  for (const Individual& member : population_) known.insert(member.genome);
-  while (plan.births < size_) add_pair(plan, known);
-  for (const Individual& child : plan.children) {
-    plan.candidates.push_back({child.birth_id, 0, child.genome});
-  }
-  return plan;
-}
-
-void Nsga2::tell(std::span<const Score> scores) {
-  assert(plan_ && scores.size() == plan_->candidates.size());
-  Plan plan = std::move(*plan_);
-  plan_.reset();
-  auto next = scores.begin();
-  for (const std::size_t i : plan.rescored) population_[i].standing.add(*next++);
-  for (Individual& child : plan.children) child.standing.add(*next++);
-  ++generation_;
-  evaluations_ += scores.size();
-  next_birth_id_ += plan.births;
-  // Progress is what beats a member of the front; where there was none, what is best.
-  const std::size_t compared = std::max(front_size_, std::min<std::size_t>(1, population_.size()));
-  const bool first = population_.empty();
-  for (const Individual& child : plan.children) {
-    for (std::size_t i = 0; i < compared; ++i) {
-      if (beats(child, population_[i])) last_improvement_ = generation_;
-    }
-  }
-  if (first) last_improvement_ = generation_;
-  std::vector<Individual> all = std::move(population_);
-  for (Individual& child : plan.children) all.push_back(std::move(child));
-  select(std::move(all));
-}
-
-// The best `size_` by fronts, the last front by crowding.
-void Nsga2::select(std::vector<Individual> all) {
-  const std::vector<std::size_t> numbers = front_numbers(
-      all.size(), [&](std::size_t a, std::size_t b) { return beats(all[a], all[b]); });
-  std::vector<std::vector<Individual>> fronts(
-      numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1);
-  for (std::size_t i = 0; i < all.size(); ++i) fronts[numbers[i]].push_back(std::move(all[i]));
-  population_.clear();
-  front_size_ = 0;
-  for (std::vector<Individual>& front : fronts) {
-    if (population_.size() == size_) break;
-    take(std::move(front));
-    const bool ended_well = population_.front().standing.outcome == v1::OK;
-    if (front_size_ == 0 && ended_well) front_size_ = population_.size();
-  }
-  note_best();
-}
-
-void Nsga2::take(std::vector<Individual> front) {
-  std::ranges::sort(front, {}, &Individual::birth_id);
-  const std::size_t room = size_ - population_.size();
-  std::vector<Costs> costs = mapped(front, costs_of);
-  std::vector<double> distances = crowding_distances(costs);
-  while (front.size() > room) {
-    const auto least = std::ranges::min_element(distances) - distances.begin();
-    front.erase(front.begin() + least);
-    costs.erase(costs.begin() + least);
-    distances = crowding_distances(costs);
-  }
-  for (const std::size_t i : order_of(distances, std::greater<>())) {
-    population_.push_back(std::move(front[i]));
-  }
-}
-
-std::vector<Costs> Nsga2::front() const {
-  return mapped(std::span(population_).first(front_size_), costs_of);
-}
-
-std::vector<Costs> Nsga2::costs_of_all() const {
-  return filtered(
-      population_, [](const Individual& one) { return one.standing.outcome == v1::OK; }, costs_of);
-}
-
-void Nsga2::note_best() {
-  const std::vector<Costs> best = front();
-  best_ = population_[best.empty() ? 0 : knee_of(best)];
-  if (!reference_.empty() || best.empty()) return;
-  reference_ = greatest_of(costs_of_all());
-}
-
-std::vector<NamedNumber> Nsga2::operator_probabilities() const {
-  std::vector<NamedNumber> figures = {{"front", static_cast<double>(front_size_)}};
-  if (reference_.size() > kMostHypervolumeCosts) return figures;
-  figures.push_back({"hypervolume", reference_.empty() ? 0 : hypervolume(front(), reference_)});
-  return figures;
-}
-
-std::string Nsga2::state() const {
-  assert(!plan_ && "save between tell() and ask()");
-  v1::GeneticState message;
-  save_counts(false, message);
-  message.mutable_reference()->Add(reference_.begin(), reference_.end());
-  return message.SerializeAsString();
-}
-
-Status Nsga2::restore(std::string_view state) {
-  ASSIGN_OR_RETURN(const auto message, parse_state<v1::GeneticState>(state));
-  RETURN_IF_ERROR(restore_counts(false, message));
-  reference_.assign(message.reference().begin(), message.reference().end());
-  const std::vector<Costs> ended_well = costs_of_all();
-  if (std::ranges::any_of(ended_well,
-                          [&](const Costs& costs) { return costs.size() != reference_.size(); })) {
-    return Error{
-        "the saved optimiser state is damaged or of other objectives; resume with the "
-        "config of the run"};
-  }
-  front_size_ = first_front(ended_well).size();
-  if (!population_.empty()) note_best();
-  return {};
-}
 
 }  // namespace
 

@@ -44,26 +44,134 @@ MethodSetup for_descent(MethodSetup setup) {
 
 class AutoSearch final : public SearchMethod {
  public:
-  explicit AutoSearch(const MethodSetup& setup);
+  explicit AutoSearch(const MethodSetup& setup)
+      : setup_(setup),
+        roomy_(setup.evaluations / kRoomy_perGene >= setup.space.size()),
+        probe_(make_method_RandomSearch(for_descent(setup))),
+        descent_(for_descent(setup), false) {
+    const std::size_t n = setup.space.size();
+    const std::string genes = std::to_string(n) + " genes";
+    // A generation to begin with, 2 n + 1 points, and some that use what these show.
+    const bool too_short = setup.evaluations < 4 * n + 10;
+    if (setup.noisy) {
+      reason_ = "CMA-ES, because scores are noisy";
+    } else if (has(setup.space, GeneShape::kUnordered)) {
+      reason_ = "differential evolution, because values of some genes have no order";
+    } else if (has(setup.space, GeneShape::kOrdered)) {
+      reason_ = "CMA-ES, because some genes are integers";
+    } else if (!setup.spread.empty()) {
+      reason_ = "CMA-ES, because it is known how far from the start to look";
+    } else if (n > kMostGenesOfDescent) {
+      reason_ = "CMA-ES, because " + genes + " are too many for BOBYQA";
+    } else if (too_short) {
+      reason_ = "CMA-ES, because the evaluations are too few for BOBYQA's model of " + genes;
+    } else {
+      reason_ =
+          "BOBYQA while it pays, at most " + std::to_string(descent_limit()) +
+          " evaluations, because all genes are real and scores free of noise; then by CMA-ES " +
+          "from " +
+          (roomy_ ? "the start, because there are evaluations enough for both"
+                  : "the best, because evaluations are few");
+      phase_ = kProbing;
+    }
+    reason_ = "kind = \"auto\": searches by " + reason_;
+    begin_global();
+  }
 
   std::vector<Genome> propose(const StreamOf& stream_of) const override {
     return current().propose(stream_of);
   }
-  void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
+
+  void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override {
+    if (phase_ == kGlobal) {
+      global_->learn(proposed, standings);
+    } else if (phase_ == kProbing) {
+      const auto least = std::ranges::min_element(standings, better);
+      descent_.begin(proposed[static_cast<std::size_t>(least - standings.begin())], *least);
+      phase_ = kDescending;
+    } else {
+      descent_.learn(proposed, standings);
+      if (!descent_.converged() && pays()) return;
+      phase_ = kGlobal;
+      if (!roomy_) setup_.start = descent_.best();
+      begin_global();
+    }
+  }
+
   unsigned origin() const override { return current().origin(); }
-  std::size_t generation_size() const override;
-  std::vector<NamedNumber> figures() const override;
+
+  // As many as one of CMA-ES, so that limits in generations mean the same all along.
+  std::size_t generation_size() const override {
+    return phase_ == kDescending ? *for_descent(setup_).settings.population : 1;
+  }
+
+  std::vector<NamedNumber> figures() const override {
+    std::vector<NamedNumber> figures = {{"phase", static_cast<double>(phase_)}};
+    for (NamedNumber& figure : current().figures()) figures.push_back(std::move(figure));
+    return figures;
+  }
+
   std::string reason() const override { return reason_; }
-  void save(v1::MethodState& message) const override;
-  Status restore(const v1::MethodState& message) override;
+
+  void save(v1::MethodState& message) const override {
+    v1::AutoSearchState& state = *message.mutable_auto_search();
+    state.set_phase(phase_);
+    state.set_roomy(roomy_);
+    state.mutable_start()->Add(setup_.start.begin(), setup_.start.end());
+    if (phase_ != kProbing) current().save(*state.mutable_method());
+  }
+
+  Status restore(const v1::MethodState& message) override {
+    const v1::AutoSearchState& state = message.auto_search();
+    const auto genes = static_cast<std::size_t>(state.start_size());
+    if (!message.has_auto_search() || state.phase() > kGlobal ||
+        (genes != 0 && genes != setup_.space.size())) {
+      return damaged_method_state("auto");
+    }
+    phase_ = static_cast<Phase>(state.phase());
+    roomy_ = state.roomy();
+    if (phase_ == kProbing) return {};
+    if (phase_ == kDescending) return descent_.restore(state.method());
+    setup_.start.assign(state.start().begin(), state.start().end());
+    begin_global();
+    return global_->restore(state.method());
+  }
 
  private:
   enum Phase { kProbing, kDescending, kGlobal };
 
-  const SearchMethod& current() const;
-  void begin_global();
-  bool pays() const;
-  std::size_t descent_limit() const;
+  const SearchMethod& current() const {
+    if (phase_ == kProbing) return *probe_;
+    if (phase_ == kDescending) return descent_;
+    return *global_;
+  }
+
+  void begin_global() {
+    // Where one start ends in the worse of few minima, as on Rosenbrock's function, small ones
+    // help.
+    MethodSetup setup = setup_;
+    if (roomy_) setup.settings.restarts = RestartKind::kBipop;
+    if (!setup_.noisy && has(setup_.space, GeneShape::kUnordered)) {
+      global_ = std::make_unique<DifferentialEvolution>(setup);
+    } else {
+      global_ = std::make_unique<CmaEs>(setup);
+    }
+  }
+
+  bool pays() const {
+    const std::size_t n = setup_.space.size(), model = 2 * n + 1;
+    if (descent_.known() >= descent_limit()) return false;
+    if (descent_.known() < model + std::max(kLeastPoints, n)) return true;
+    const std::size_t since = descent_.known() - model;
+    return static_cast<double>(descent_.improvements(since)) >=
+           kLeastShare * static_cast<double>(since);
+  }
+
+  std::size_t descent_limit() const {
+    const std::size_t given = setup_.settings.local_evaluations;
+    return given > 0 ? given
+                     : setup_.space.size() * (roomy_ ? kRoomyDescent_perGene : kDescent_perGene);
+  }
 
   MethodSetup setup_;  // of the global search
   bool roomy_;         // evaluations enough for CMA-ES to begin anew
@@ -73,122 +181,6 @@ class AutoSearch final : public SearchMethod {
   LocalSearch descent_;
   std::unique_ptr<SearchMethod> global_;
 };
-
-AutoSearch::AutoSearch(const MethodSetup& setup)
-    : setup_(setup),
-      roomy_(setup.evaluations / kRoomy_perGene >= setup.space.size()),
-      probe_(make_method_RandomSearch(for_descent(setup))),
-      descent_(for_descent(setup), false) {
-  const std::size_t n = setup.space.size();
-  const std::string genes = std::to_string(n) + " genes";
-  // A generation to begin with, 2 n + 1 points, and some that use what these show.
-  const bool too_short = setup.evaluations < 4 * n + 10;
-  if (setup.noisy) {
-    reason_ = "CMA-ES, because scores are noisy";
-  } else if (has(setup.space, GeneShape::kUnordered)) {
-    reason_ = "differential evolution, because values of some genes have no order";
-  } else if (has(setup.space, GeneShape::kOrdered)) {
-    reason_ = "CMA-ES, because some genes are integers";
-  } else if (!setup.spread.empty()) {
-    reason_ = "CMA-ES, because it is known how far from the start to look";
-  } else if (n > kMostGenesOfDescent) {
-    reason_ = "CMA-ES, because " + genes + " are too many for BOBYQA";
-  } else if (too_short) {
-    reason_ = "CMA-ES, because the evaluations are too few for BOBYQA's model of " + genes;
-  } else {
-    reason_ = "BOBYQA while it pays, at most " + std::to_string(descent_limit()) +
-              " evaluations, because all genes are real and scores free of noise; then by CMA-ES " +
-              "from " +
-              (roomy_ ? "the start, because there are evaluations enough for both"
-                      : "the best, because evaluations are few");
-    phase_ = kProbing;
-  }
-  reason_ = "kind = \"auto\": searches by " + reason_;
-  begin_global();
-}
-
-std::size_t AutoSearch::descent_limit() const {
-  const std::size_t given = setup_.settings.local_evaluations;
-  return given > 0 ? given
-                   : setup_.space.size() * (roomy_ ? kRoomyDescent_perGene : kDescent_perGene);
-}
-
-void AutoSearch::begin_global() {
-  // Where one start ends in the worse of few minima, as on Rosenbrock's function, small ones help.
-  MethodSetup setup = setup_;
-  if (roomy_) setup.settings.restarts = RestartKind::kBipop;
-  if (!setup_.noisy && has(setup_.space, GeneShape::kUnordered)) {
-    global_ = std::make_unique<DifferentialEvolution>(setup);
-  } else {
-    global_ = std::make_unique<CmaEs>(setup);
-  }
-}
-
-const SearchMethod& AutoSearch::current() const {
-  if (phase_ == kProbing) return *probe_;
-  if (phase_ == kDescending) return descent_;
-  return *global_;
-}
-
-void AutoSearch::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
-  if (phase_ == kGlobal) {
-    global_->learn(proposed, standings);
-  } else if (phase_ == kProbing) {
-    const auto least = std::ranges::min_element(standings, better);
-    descent_.begin(proposed[static_cast<std::size_t>(least - standings.begin())], *least);
-    phase_ = kDescending;
-  } else {
-    descent_.learn(proposed, standings);
-    if (!descent_.converged() && pays()) return;
-    phase_ = kGlobal;
-    if (!roomy_) setup_.start = descent_.best();
-    begin_global();
-  }
-}
-
-bool AutoSearch::pays() const {
-  const std::size_t n = setup_.space.size(), model = 2 * n + 1;
-  if (descent_.known() >= descent_limit()) return false;
-  if (descent_.known() < model + std::max(kLeastPoints, n)) return true;
-  const std::size_t since = descent_.known() - model;
-  return static_cast<double>(descent_.improvements(since)) >=
-         kLeastShare * static_cast<double>(since);
-}
-
-// As many as one of CMA-ES, so that limits in generations mean the same all along.
-std::size_t AutoSearch::generation_size() const {
-  return phase_ == kDescending ? *for_descent(setup_).settings.population : 1;
-}
-
-std::vector<NamedNumber> AutoSearch::figures() const {
-  std::vector<NamedNumber> figures = {{"phase", static_cast<double>(phase_)}};
-  for (NamedNumber& figure : current().figures()) figures.push_back(std::move(figure));
-  return figures;
-}
-
-void AutoSearch::save(v1::MethodState& message) const {
-  v1::AutoSearchState& state = *message.mutable_auto_search();
-  state.set_phase(phase_);
-  state.set_roomy(roomy_);
-  state.mutable_start()->Add(setup_.start.begin(), setup_.start.end());
-  if (phase_ != kProbing) current().save(*state.mutable_method());
-}
-
-Status AutoSearch::restore(const v1::MethodState& message) {
-  const v1::AutoSearchState& state = message.auto_search();
-  const auto genes = static_cast<std::size_t>(state.start_size());
-  if (!message.has_auto_search() || state.phase() > kGlobal ||
-      (genes != 0 && genes != setup_.space.size())) {
-    return damaged_method_state("auto");
-  }
-  phase_ = static_cast<Phase>(state.phase());
-  roomy_ = state.roomy();
-  if (phase_ == kProbing) return {};
-  if (phase_ == kDescending) return descent_.restore(state.method());
-  setup_.start.assign(state.start().begin(), state.start().end());
-  begin_global();
-  return global_->restore(state.method());
-}
 
 }  // namespace
 

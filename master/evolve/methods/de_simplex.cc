@@ -18,9 +18,36 @@ class DeSimplex final : public SearchMethod {
   std::vector<Genome> propose(const StreamOf& stream_of) const override {
     return current().propose(stream_of);
   }
-  void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
+
+  void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override {
+    if (polishing_) {
+      simplex_.learn(proposed, standings);
+      if (!simplex_.converged()) return;
+      ++rounds_;
+      polishing_ = false;
+      MethodSetup anew = setup_;
+      anew.start.clear();
+      differential_ = DifferentialEvolution(anew);
+      return;
+    }
+    // The iteration that ends differential evolution may be one that starts it over with nobody.
+    const auto least = std::ranges::min_element(standings, better);
+    Individual best;
+    best.genome = proposed[static_cast<std::size_t>(least - standings.begin())];
+    best.standing = *least;
+    differential_.learn(proposed, standings);
+    if (differential_.iterations() < setup_.settings.iterations) return;
+    if (differential_.has_population()) best = differential_.best();
+    simplex_.begin(best.genome, best.standing);
+    polishing_ = true;
+  }
+
   unsigned origin() const override { return current().origin(); }
-  std::vector<NamedNumber> figures() const override;
+
+  std::vector<NamedNumber> figures() const override {
+    return {{"simplex", polishing_ ? 1.0 : 0.0}, {"rounds", static_cast<double>(rounds_)}};
+  }
+
   bool compares_scores() const override { return true; }
   std::vector<Standing> compared() const override { return current().compared(); }
   void settle() override {
@@ -29,12 +56,33 @@ class DeSimplex final : public SearchMethod {
   std::span<Individual> incumbents() override {
     return polishing_ ? simplex_.incumbents() : differential_.incumbents();
   }
-  void save(v1::MethodState& message) const override;
-  Status restore(const v1::MethodState& message) override;
+
+  void save(v1::MethodState& message) const override {
+    v1::DeSimplexState& state = *message.mutable_de_simplex();
+    SAVE_STATE(polishing, rounds)
+    differential_.save(*state.mutable_differential());
+    simplex_.save(*state.mutable_simplex());
+  }
+
+  Status restore(const v1::MethodState& message) override {
+    const v1::DeSimplexState& state = message.de_simplex();
+    LOAD_STATE(polishing, rounds)
+    RETURN_IF_ERROR(differential_.restore(state.differential()));
+    return simplex_.restore(state.simplex());
+  }
 
  private:
-  static MethodSetup with_fixed_rates(MethodSetup setup);
-  const SearchMethod& current() const;
+  // As the hybrid was described: differential evolution does not adapt itself.
+  static MethodSetup with_fixed_rates(MethodSetup setup) {
+    std::optional<double>& weight = setup.settings.differential_weight;
+    if (!weight) weight = DifferentialEvolution::kWeight;
+    return setup;
+  }
+
+  const SearchMethod& current() const {
+    if (polishing_) return simplex_;
+    return differential_;
+  }
 
   MethodSetup setup_;
   bool polishing_ = false;
@@ -42,59 +90,6 @@ class DeSimplex final : public SearchMethod {
   DifferentialEvolution differential_;
   LocalSearch simplex_;
 };
-
-// As the hybrid was described: differential evolution does not adapt itself.
-MethodSetup DeSimplex::with_fixed_rates(MethodSetup setup) {
-  std::optional<double>& weight = setup.settings.differential_weight;
-  if (!weight) weight = DifferentialEvolution::kWeight;
-  return setup;
-}
-
-const SearchMethod& DeSimplex::current() const {
-  if (polishing_) return simplex_;
-  return differential_;
-}
-
-void DeSimplex::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
-  if (polishing_) {
-    simplex_.learn(proposed, standings);
-    if (!simplex_.converged()) return;
-    ++rounds_;
-    polishing_ = false;
-    MethodSetup anew = setup_;
-    anew.start.clear();
-    differential_ = DifferentialEvolution(anew);
-    return;
-  }
-  // The iteration that ends differential evolution may be one that starts it over with nobody.
-  const auto least = std::ranges::min_element(standings, better);
-  Individual best;
-  best.genome = proposed[static_cast<std::size_t>(least - standings.begin())];
-  best.standing = *least;
-  differential_.learn(proposed, standings);
-  if (differential_.iterations() < setup_.settings.iterations) return;
-  if (differential_.has_population()) best = differential_.best();
-  simplex_.begin(best.genome, best.standing);
-  polishing_ = true;
-}
-
-std::vector<NamedNumber> DeSimplex::figures() const {
-  return {{"simplex", polishing_ ? 1.0 : 0.0}, {"rounds", static_cast<double>(rounds_)}};
-}
-
-void DeSimplex::save(v1::MethodState& message) const {
-  v1::DeSimplexState& state = *message.mutable_de_simplex();
-  SAVE_STATE(polishing, rounds)
-  differential_.save(*state.mutable_differential());
-  simplex_.save(*state.mutable_simplex());
-}
-
-Status DeSimplex::restore(const v1::MethodState& message) {
-  const v1::DeSimplexState& state = message.de_simplex();
-  LOAD_STATE(polishing, rounds)
-  RETURN_IF_ERROR(differential_.restore(state.differential()));
-  return simplex_.restore(state.simplex());
-}
 
 }  // namespace
 

@@ -1,20 +1,21 @@
 // What one search does with ranks alone: the part of an optimiser that knows a method's name.
 //
 // A method proposes points and learns how they stand.  Counting, naming, scoring again under noise,
-// recognising what was scored before and remembering the best are SearchOptimiser's.
+// recognising what was scored before and remembering the best are make_search()'s.
 #pragma once
 
 #include <cmath>
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/config/settings.h"
 #include "gapfarm/v1/record.pb.h"
-#include "master/evolve/gene_space.h"
 #include "master/evolve/individual.h"
+#include "master/evolve/optimiser.h"
 
 namespace gapfarm {
 
@@ -66,6 +67,10 @@ class SearchMethod {
   // Error: the message is not one that save() made for this setup.
   virtual Status restore(const v1::MethodState& message) = 0;
 };
+
+// The optimiser that asks for what `method` proposes; `kind`: its name in configs.
+std::unique_ptr<Optimiser> make_search(std::string kind, const OptimiserSetup& setup,
+                                       std::unique_ptr<SearchMethod> method);
 
 // Into [0, 1] as if mirrors stood at both ends.
 inline double mirrored(double gene) { return std::abs(std::remainder(gene, 2)); }

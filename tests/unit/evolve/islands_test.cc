@@ -1,5 +1,4 @@
 // Islands: whatever order scores come in, the generations are the same to the bit.
-#include "master/evolve/islands.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,6 +8,7 @@
 
 #include "common/random/stream.h"
 #include "master/evolve/evolve.h"
+#include "master/evolve/optimisers.h"
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/search_functions.h"
 #include "tests/unit/evolve/toy_problems.h"
