@@ -5,7 +5,6 @@
 #include <unordered_map>
 
 #include "common/base/ranges.h"
-#include "master/evolve/islands.h"
 #include "master/ground/fit/kinematic_baseline.h"
 
 namespace gapfarm {
@@ -103,9 +102,15 @@ double fitness_of_cost(FitnessKind kind, double cost) {
   return higher_is_better(kind) ? -cost : cost;
 }
 
-std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser& optimiser,
-                                                                 const EvolveOptions& options,
-                                                                 double wall_s, bool requested) {
+namespace {
+
+using Stop = std::pair<StopReason, std::string>;
+
+constexpr std::uint64_t kMostAhead = 16;  // generations of an island
+
+// The first condition that holds now, if any, with a sentence.
+std::optional<Stop> reason_to_stop(const Optimiser& optimiser, const EvolveOptions& options,
+                                   double wall_s, bool requested) {
   const EvolutionSettings& s = options.settings;
   const std::uint64_t generation = optimiser.generation();
   if (requested) {
@@ -136,30 +141,21 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
   return std::nullopt;
 }
 
+// Everything but the wall time.
 GenerationRecord record_generation(const Optimiser& optimiser) {
-  GenerationRecord record;
-  record.generation = optimiser.generation();
-  record.members = optimiser.members();
-  record.diversity = optimiser.diversity();
-  record.operator_probabilities = optimiser.operator_probabilities();
-  record.evaluations = optimiser.evaluations();
-  record.optimiser_state = optimiser.state();
-  return record;
+  return {.generation = optimiser.generation(),
+          .diversity = optimiser.diversity(),
+          .operator_probabilities = optimiser.operator_probabilities(),
+          .evaluations = optimiser.evaluations(),
+          .members = optimiser.members(),
+          .optimiser_state = optimiser.state()};
 }
 
-EvolveSummary summarise(const Optimiser& optimiser,
-                        const std::pair<StopReason, std::string>& reason, double wall_s) {
-  EvolveSummary summary;
-  summary.reason = reason.first;
-  summary.text = reason.second;
-  summary.generations = optimiser.generation();
-  summary.evaluations = optimiser.evaluations();
-  summary.wall_s = wall_s;
-  if (optimiser.generation() > 0) summary.best = optimiser.best();
-  return summary;
+EvolveSummary summarise(const Optimiser& optimiser, const Stop& reason, double wall_s) {
+  const auto best = optimiser.generation() > 0 ? std::optional(optimiser.best()) : std::nullopt;
+  return {reason.first, reason.second, optimiser.generation(), optimiser.evaluations(),
+          wall_s,       best};
 }
-
-namespace {
 
 // In the candidates' order.
 Result<std::vector<Score>> scores_of(const ScoreCandidates& score_all,
@@ -180,8 +176,6 @@ Result<std::vector<Score>> scores_of(const ScoreCandidates& score_all,
 // Islands that go on one by one.
 class IslandLoop {
  public:
-  using Stop = std::pair<StopReason, std::string>;
-
   IslandLoop(Optimiser& optimiser, const KeepGeneration& keep, const EvolveOptions& options,
              std::function<double()> spent_s)
       : optimiser_(optimiser),

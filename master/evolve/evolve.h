@@ -42,8 +42,6 @@ struct GenerationRecord {
 // Keeps a generation; it counts as done once this returned.
 using KeepGeneration = std::function<Status(const GenerationRecord& record)>;
 
-constexpr std::uint64_t kMostAhead = 16;  // generations of an island
-
 // Seconds of a clock that never goes back.
 using EvolveClock = std::function<double()>;
 
@@ -75,33 +73,16 @@ struct EvolveSummary {
   std::optional<Individual> best;  // none before the first generation
 };
 
-// The first condition that holds now, if any, with a sentence: a request, the target fitness,
-// generations, evaluations, time, stagnation.  They are looked at between generations, so a run may
-// pass its evaluations or time by less than one generation.
-std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser& optimiser,
-                                                                 const EvolveOptions& options,
-                                                                 double wall_s, bool requested);
-
-// Runs `optimiser` until there is a reason to stop.  Islands go on one by one, no further ahead of
-// the slowest than kMostAhead generations, and to the same generations to the bit as if they
-// waited for one another; what they did ahead of the last commit is lost when the run stops, unless
-// by a number of generations or evaluations.  `stop_requested` is polled between generations
-// (who scores is notified separately).  Errors: of `score` or `keep`.
+// Runs `optimiser` until there is a reason to stop.  Stop conditions are looked at between
+// generations, so a run may pass its evaluations or time by less than one generation.  Islands go
+// on one by one, no further ahead of the slowest than 16 generations, and to the same generations
+// to the bit as if they waited for one another; what they did ahead of the last commit is lost when
+// the run stops, unless by a number of generations or evaluations.  `stop_requested` is polled
+// between generations (who scores is notified separately).  Errors: of `score` or `keep`.
 Result<EvolveSummary> evolve(Optimiser& optimiser, const ScoreCandidates& score,
                              const KeepGeneration& keep, const EvolveClock& clock,
                              const EvolveOptions& options,
                              const std::function<bool()>& stop_requested = {});
-
-// The steps of evolve() that look at the optimiser without driving it.
-
-// Everything but the wall time.
-GenerationRecord record_generation(const Optimiser& optimiser);
-
-EvolveSummary summarise(const Optimiser& optimiser,
-                        const std::pair<StopReason, std::string>& reason, double wall_s);
-
-// Between the optimisers and the workers: a problem to an optimiser, candidates to tasks, results
-// to scores.
 
 // What a run's optimiser is made from.
 OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem& problem,
@@ -111,8 +92,6 @@ v1::Task evaluation_task(const Candidate& candidate, std::uint64_t run_seed);
 
 // Errors: a worker refused the evaluation, or did not answer with a number an objective.
 Result<Score> score_of(const v1::TaskResult& result, const FitnessSettings& fitness);
-
-// How long a run will still take.
 
 // What a run did, in all and since its present master started.
 struct Pace {
