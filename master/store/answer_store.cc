@@ -9,11 +9,7 @@
 namespace gapfarm {
 namespace {
 
-std::string first_blob(const SqlStatement& row) {
-  std::string bytes;
-  row.read_all(SqlBlob{bytes});
-  return bytes;
-}
+std::string first_text(const SqlStatement& row) { return row.text(0); }
 
 Status check_identity(const Database& database) {
   ASSIGN_OR_RETURN(const auto is, database.identity("read the answers"));
@@ -57,7 +53,7 @@ std::string AnswerStore::key(const std::string& problem_hash, const v1::Task& ta
 Result<std::optional<v1::TaskResult>> AnswerStore::find(const std::string& key) const {
   ASSIGN_OR_RETURN(const auto bytes,
                    database_.row("read answers", "SELECT result FROM answers WHERE question = ?",
-                                 first_blob, key));
+                                 first_text, key));
   std::optional<v1::TaskResult> result;
   if (bytes && !result.emplace().ParseFromString(*bytes)) {
     return Error{database_.file().string() + ": the answer " + key +
@@ -101,8 +97,7 @@ Result<std::optional<std::string>> read_command(const std::filesystem::path& fil
                    database.integer("SELECT count(*) FROM sqlite_master WHERE name = 'command'",
                                     "read the command"));
   if (there == 0) return std::optional<std::string>();  // of an older program
-  return database.row("read the command", "SELECT record FROM command",
-                      [](const SqlStatement& row) { return row.text(0); });
+  return database.row("read the command", "SELECT record FROM command", first_text);
 }
 
 Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file) {

@@ -84,9 +84,10 @@ SqlStatement& SqlStatement::bind(int index, std::string_view value) {
   return *this;
 }
 
-SqlStatement& SqlStatement::bind_blob(int index, std::string_view value) {
-  bind_result_ |= sqlite3_bind_blob64(statement_.get(), index, value.data() ? value.data() : "",
-                                      value.size(), SQLITE_TRANSIENT);
+SqlStatement& SqlStatement::bind(int index, SqlBlob value) {
+  const std::string_view bytes = value.bytes;
+  bind_result_ |= sqlite3_bind_blob64(statement_.get(), index, bytes.data() ? bytes.data() : "",
+                                      bytes.size(), SQLITE_TRANSIENT);
   return *this;
 }
 
@@ -128,13 +129,6 @@ std::string SqlStatement::text(int column) const {
   const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
   if (!bytes) return {};
   return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
-}
-
-void SqlStatement::read(int column, SqlBlob<std::string> to) const {
-  const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_.get(), column));
-  to.bytes.assign(
-      bytes ? bytes : "",
-      bytes ? static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column)) : 0);
 }
 
 Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {

@@ -23,13 +23,10 @@ struct SqlClose {
   void operator()(sqlite3_stmt* statement) const;
 };
 
-// Bytes that are no text: to be bound, or a place to read them into.
-template <class Bytes>
+// Bytes that are no text, to be bound.
 struct SqlBlob {
-  Bytes& bytes;
+  std::string_view bytes;
 };
-template <class Bytes>
-SqlBlob(Bytes&) -> SqlBlob<Bytes>;
 
 // A prepared statement.  May not outlive its Database.  Parameters count from 1, columns from 0.
 class SqlStatement {
@@ -38,10 +35,7 @@ class SqlStatement {
   SqlStatement& bind(int index, double value);  // NaN becomes NULL
   SqlStatement& bind(int index, std::optional<double> value);
   SqlStatement& bind(int index, std::string_view value);
-  template <class Bytes>
-  SqlStatement& bind(int index, SqlBlob<Bytes> value) {
-    return bind_blob(index, value.bytes);
-  }
+  SqlStatement& bind(int index, SqlBlob value);
   template <class Whole>
   requires std::is_integral_v<Whole> SqlStatement& bind(int index, Whole value) {
     return bind(index, static_cast<std::int64_t>(value));
@@ -68,7 +62,7 @@ class SqlStatement {
   Status run();
 
   std::int64_t integer(int column) const;
-  std::string text(int column) const;
+  std::string text(int column) const;  // or the bytes of a blob, as they are
   // The row's columns in their order, from `first` on.
   template <class... Targets>
   void read_from(int first, Targets&&... to) const {
@@ -80,11 +74,9 @@ class SqlStatement {
   }
 
  private:
-  SqlStatement& bind_blob(int index, std::string_view value);
   void read(int column, double& to) const;
   void read(int column, std::optional<double>& to) const;
   void read(int column, std::string& to) const { to = text(column); }
-  void read(int column, SqlBlob<std::string> to) const;
   template <class Whole>
   requires std::is_integral_v<Whole>
   void read(int column, Whole& to) const { to = static_cast<Whole>(integer(column)); }

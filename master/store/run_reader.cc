@@ -32,7 +32,7 @@ RunState state_of(const std::string& name) {
 StoredIndividual individual_of(const SqlStatement& row, int at) {
   StoredIndividual individual;
   std::string genome, parents, objectives;
-  row.read_from(at, individual.birth_id, SqlBlob{genome}, individual.values, individual.outcome,
+  row.read_from(at, individual.birth_id, genome, individual.values, individual.outcome,
                 individual.fitness, individual.scores, parents, individual.operators, objectives);
   if (!objectives.empty()) {
     const Json values = parse_json(objectives);
@@ -114,12 +114,7 @@ Result<std::string> RunReader::optimiser_state(std::uint64_t generation) const {
       const auto state,
       database_.row(
           "read the search's state", "SELECT optimiser_state FROM generations WHERE generation = ?",
-          [](const SqlStatement& row) {
-            std::string blob;
-            row.read_all(SqlBlob{blob});
-            return blob;
-          },
-          generation));
+          [](const SqlStatement& row) { return row.text(0); }, generation));
   return state.value_or(std::string());
 }
 

@@ -275,7 +275,7 @@ Result<std::optional<Checkpoint>> RunStore::checkpoint(
       "NULL OR generation = ?1 ORDER BY generation DESC LIMIT 1",
       [](const SqlStatement& row) {
         Checkpoint c;
-        row.read_all(c.generation, c.evaluations, SqlBlob{c.optimiser_state}, c.digest, c.wall_s);
+        row.read_all(c.generation, c.evaluations, c.optimiser_state, c.digest, c.wall_s);
         return c;
       },
       generation);

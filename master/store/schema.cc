@@ -93,8 +93,8 @@ Result<RunInfo> load_run_info(const Database& database) {
             RunInfo i;
             std::string seed;
             row.read_all(i.program_version, i.fingerprint, i.created, i.config_path, i.config_text,
-                         i.overrides, SqlBlob{i.problem}, i.problem_hash, seed, i.numeric_class,
-                         i.fitness, i.fitness_unit, i.higher_is_better);
+                         i.overrides, i.problem, i.problem_hash, seed, i.numeric_class, i.fitness,
+                         i.fitness_unit, i.higher_is_better);
             std::from_chars(seed.data(), seed.data() + seed.size(), i.seed);
             return i;
           }));

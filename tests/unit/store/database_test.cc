@@ -30,7 +30,7 @@ TEST_F(DatabaseTest, ReturnsBytesAndNumbersAsTheyWere) {
 
   const auto rows = database.rows("select", "SELECT a, b FROM t", [](const SqlStatement& row) {
     std::pair<std::string, std::optional<double>> read;
-    row.read_all(SqlBlob{read.first}, read.second);
+    row.read_all(read.first, read.second);
     return read;
   });
   ASSERT_TRUE(rows.ok());
