@@ -22,10 +22,22 @@ enum class DecodeStatus {
 };
 
 // Sets the protocol version.
-std::string encode(v1::Envelope* envelope);
+inline std::string encode(v1::Envelope* envelope) {
+  envelope->set_protocol(kProtocol);
+  return envelope->SerializeAsString();
+}
 
 // Reads into `envelope`, whose memory is used again.  Never trusts a byte.
-DecodeStatus decode(std::string_view bytes, v1::Envelope* envelope);
+inline DecodeStatus decode(std::string_view bytes, v1::Envelope* envelope) {
+  if (bytes.size() > kMaxMessageBytes) return DecodeStatus::kMalformed;
+  if (!envelope->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return DecodeStatus::kMalformed;
+  }
+  if (envelope->protocol() == 0) return DecodeStatus::kMalformed;
+  if (envelope->protocol() != kProtocol) return DecodeStatus::kOtherProtocol;
+  if (envelope->body_case() == v1::Envelope::BODY_NOT_SET) return DecodeStatus::kMalformed;
+  return DecodeStatus::kOk;
+}
 
 // Messages between peers, without a word about sockets: the master's and the workers' state
 // machines run over ZeroMQ (socket.h) or, under test, over a simulated network.
