@@ -1,11 +1,10 @@
-#include "common/trials/dialect.h"
-
 #include <algorithm>
 #include <array>
 #include <map>
 #include <set>
 
 #include "common/base/text.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -65,7 +65,6 @@ struct TrialLog {
 };
 
 // Parts of a trial log, picked by what stands in a column.
-
 using TrialColumnReader = std::function<std::string(const Trial&)>;
 
 // What stands in a column of a log's trials: session, trial, command (or object, the same) or one

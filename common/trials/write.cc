@@ -1,5 +1,3 @@
-#include "common/trials/write.h"
-
 #include <cmath>
 #include <filesystem>
 #include <set>
@@ -8,6 +6,7 @@
 #include "common/base/text.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
+#include "common/trials/read.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/text/trial_parser.h"
 

@@ -1,9 +1,8 @@
-#include "master/farm/second_opinions.h"
-
 #include <utility>
 
 #include "common/base/hash.h"
 #include "common/problem/problem.h"
+#include "master/farm/job_queue.h"
 
 namespace gapfarm {
 namespace {

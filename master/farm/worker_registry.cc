@@ -1,6 +1,5 @@
-#include "master/farm/worker_registry.h"
-
 #include "common/base/ranges.h"
+#include "master/farm/scheduler.h"
 
 namespace gapfarm {
 namespace {
@@ -15,15 +14,10 @@ constexpr std::size_t kMostWhyBytes = 500;
 constexpr double kHeardFor_s = 120;
 
 WorkerStatus status_of(const WorkerRecord& worker, const char* state, double now) {
-  WorkerStatus status;
-  status.name = worker.name;
-  status.host = worker.host;
-  status.state = state;
-  status.jobs = static_cast<unsigned>(worker.holds.size());
-  status.finished = worker.finished;
-  const double there = now - worker.joined;
-  status.rate_per_s = there > 0 ? static_cast<double>(worker.finished) / there : 0;
-  return status;
+  const double there = now - worker.joined, finished = static_cast<double>(worker.finished);
+  return {worker.name,     worker.host,
+          state,           static_cast<unsigned>(worker.holds.size()),
+          worker.finished, there > 0 ? finished / there : 0};
 }
 
 }  // namespace
@@ -90,8 +84,8 @@ WorkerRecord* WorkerRegistry::find_peer(const std::string& peer) {
 }
 
 WorkerRecord* WorkerRegistry::find_name(const std::string& name) const {
-  const auto found = by_name_.find(name);
-  return found == by_name_.end() ? nullptr : found->second;
+  WorkerRecord* const* found = find_in(by_name_, name);
+  return found ? *found : nullptr;
 }
 
 WorkerRecord* WorkerRegistry::find(WorkerId id) {
@@ -141,16 +135,10 @@ bool FleetRegistry::hear(const std::string& peer, const v1::Fleet& report, doubl
   }
   std::erase_if(fleets_, [&](const auto& one) { return now - one.second.at > kHeardFor_s; });
   if (fleets_.size() >= kMostFleets && !fleets_.contains(report.name())) return false;
-  FleetStatus status;
-  status.name = report.name();
-  status.system = report.system();
-  status.host = report.host();
-  status.wanted = report.wanted();
-  status.queued = report.queued();
-  status.running = report.running();
-  status.lost = report.lost();
-  status.why = report.why().substr(0, kMostWhyBytes);
-  fleets_[report.name()] = {peer, std::move(status), now};
+  const FleetStatus status = {
+      report.name(),   report.system(),  report.host(), report.wanted(),
+      report.queued(), report.running(), report.lost(), report.why().substr(0, kMostWhyBytes)};
+  fleets_[report.name()] = {peer, status, now};
   return true;
 }
 

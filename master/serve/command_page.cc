@@ -9,7 +9,7 @@
 #include "common/base/text.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/serve/pages.h"
+#include "master/serve/site.h"
 #include "master/store/answer_store.h"
 
 namespace gapfarm {

@@ -1,11 +1,10 @@
-#include "master/serve/found.h"
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "common/json/json.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
+#include "master/serve/site.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -142,6 +141,24 @@ void read_headline(const FoundWork& found, WorkEntry* entry) {
   if (entry->state.empty()) entry->state = "finished";
 }
 
+// Never fails: what cannot be read says so in `trouble`.
+WorkEntry entry_of(const FoundWork& found, double now_unix_s) {
+  WorkEntry entry;
+  entry.kind = found.kind;
+  entry.name = found.name;
+  entry.what = found.kind == FoundWork::Kind::kRun         ? "run"
+               : found.kind == FoundWork::Kind::kDiagnosis ? "diagnosis"
+                                                           : "command";
+  const bool run = found.kind == FoundWork::Kind::kRun;
+  const Status read =
+      run ? read_run(found, now_unix_s, &entry) : read_command_of(found, now_unix_s, &entry);
+  if (!read) entry.trouble = read.error().message;
+  if (found.kind == FoundWork::Kind::kDiagnosis && entry.state != "running") {
+    read_headline(found, &entry);
+  }
+  return entry;
+}
+
 }  // namespace
 
 std::vector<FoundWork> find_work(const std::vector<fs::path>& roots) {
@@ -162,23 +179,6 @@ std::string stamp_of(const fs::path& folder) {
     stamp += ' ';
   }
   return stamp;
-}
-
-WorkEntry entry_of(const FoundWork& found, double now_unix_s) {
-  WorkEntry entry;
-  entry.kind = found.kind;
-  entry.name = found.name;
-  entry.what = found.kind == FoundWork::Kind::kRun         ? "run"
-               : found.kind == FoundWork::Kind::kDiagnosis ? "diagnosis"
-                                                           : "command";
-  const bool run = found.kind == FoundWork::Kind::kRun;
-  const Status read =
-      run ? read_run(found, now_unix_s, &entry) : read_command_of(found, now_unix_s, &entry);
-  if (!read) entry.trouble = read.error().message;
-  if (found.kind == FoundWork::Kind::kDiagnosis && entry.state != "running") {
-    read_headline(found, &entry);
-  }
-  return entry;
 }
 
 bool WorkEntries::holds(const Known& known, const std::string& stamp, double now_unix_s) const {

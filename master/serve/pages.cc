@@ -1,5 +1,3 @@
-#include "master/serve/pages.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 #include "master/serve/request.h"
+#include "master/serve/site.h"
 
 namespace gapfarm {
 namespace {

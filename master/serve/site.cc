@@ -8,7 +8,6 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/html.h"
 #include "master/report/report_html.h"
-#include "master/serve/pages.h"
 
 namespace gapfarm {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "master/farm/sites/autoscaler.h"
+#include "master/farm/sites/fleet.h"
 
 namespace gapfarm {
 

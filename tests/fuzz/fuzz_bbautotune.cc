@@ -4,7 +4,6 @@
 
 #include "common/trials/read.h"
 #include "common/trials/text/trial_parser.h"
-#include "common/trials/write.h"
 #include "tests/fuzz/fuzz_target.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

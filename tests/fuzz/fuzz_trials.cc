@@ -5,7 +5,6 @@
 #include "common/trials/context.h"
 #include "common/trials/read.h"
 #include "common/trials/text/trial_parser.h"
-#include "common/trials/write.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace gapfarm {

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "common/trials/read.h"
-#include "common/trials/write.h"
 #include "tests/integration/diagnose_program.h"
 
 namespace gapfarm::diagnose_pushes_test {

@@ -7,7 +7,7 @@
 
 #include "common/json/json.h"
 #include "common/trials/files.h"
-#include "common/trials/write.h"
+#include "common/trials/read.h"
 
 namespace gapfarm::truths {
 namespace {

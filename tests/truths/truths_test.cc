@@ -7,7 +7,7 @@
 
 #include "common/effects/catalogue.h"
 #include "common/trials/files.h"
-#include "common/trials/write.h"
+#include "common/trials/read.h"
 #include "tests/planar/planar_engine.h"
 #include "tests/truths/cases.h"
 

@@ -9,7 +9,6 @@
 
 #include "common/base/text.h"
 #include "common/pose/pose.h"
-#include "common/trials/dialect.h"
 
 namespace gapfarm {
 namespace {

@@ -17,7 +17,6 @@
 namespace gapfarm {
 
 // The columns of the trial format, in the order that the writer writes them.
-
 enum TrialColumn : std::size_t {
   kSession,
   kTrial,

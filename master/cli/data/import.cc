@@ -5,7 +5,7 @@
 #include "common/base/ranges.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
-#include "common/trials/write.h"
+#include "common/trials/read.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
 #include "master/io/logs/bags.h"

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/json/fields.h"
+#include "common/trials/read.h"
 #include "common/trials/text/csv.h"
-#include "common/trials/write.h"
 #include "master/cli/diagnosis/plan_drive.h"
 #include "master/cli/subcommand.h"
 #include "master/diagnose/conclusions/findings.h"

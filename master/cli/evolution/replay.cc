@@ -6,8 +6,8 @@
 
 #include "common/base/ranges.h"
 #include "common/json/fields.h"
+#include "common/trials/read.h"
 #include "common/trials/text/csv.h"
-#include "common/trials/write.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
 #include "master/evolve/evolve.h"

@@ -2,7 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "common/trials/write.h"
+#include "common/trials/read.h"
 #include "master/cli/models/parameter_options.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"

@@ -7,7 +7,7 @@
 #include "common/config/model.h"
 #include "common/math/statistics.h"
 #include "common/trials/files.h"
-#include "common/trials/write.h"
+#include "common/trials/read.h"
 #include "master/experiments/crossfit/crossfit.h"
 #include "master/farm/planned_trials.h"
 

@@ -1,9 +1,8 @@
-#include "master/farm/sites/autoscaler.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/text.h"
+#include "master/farm/sites/fleet.h"
 
 namespace gapfarm {
 namespace {

@@ -1,12 +1,12 @@
-#include "master/farm/sites/site.h"
-
-#include <algorithm>
 #include <cmath>
 #include <regex>
+#include <string_view>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/config/toml_section.h"
 #include "common/json/fields.h"
+#include "master/farm/sites/fleet.h"
 
 namespace gapfarm {
 namespace {
@@ -93,12 +93,9 @@ std::vector<ListedJob> parse_list(const ClusterSite& site, const std::string& na
                                   const std::string& output) {
   const std::regex pattern(site.line);
   std::vector<ListedJob> jobs;
-  for (std::size_t at = 0; at < output.size();) {
-    const std::size_t end = std::min(output.find('\n', at), output.size());
-    const std::string line = output.substr(at, end - at);
-    at = end + 1;
-    std::smatch match;
-    if (!std::regex_search(line, match, pattern)) continue;
+  for (const std::string_view line : lines_of(output)) {
+    std::cmatch match;
+    if (!std::regex_search(line.data(), line.data() + line.size(), match, pattern)) continue;
     ListedJob job;
     std::string task, named = name;
     for (std::size_t i = 0; i < site.columns.size() && i + 1 < match.size(); ++i) {

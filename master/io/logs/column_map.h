@@ -95,8 +95,6 @@ bool to_pose(const TableMap& map, std::vector<double>& values);
 bool at_its_time(const TableMap& map, bool poses, std::vector<double>& before,
                  std::vector<double>& values);
 
-// What a recording's column is in SI.
-
 // A number n of the column is slope n + offset.
 struct SiLine {
   double slope, offset;
@@ -124,7 +122,6 @@ bool are_durations(const std::vector<double>& times, double second);
 bool seems_to_wrap(const LogTable& table, std::size_t column);
 
 // Recordings and a map to the one format of runs (docs/formats.md).
-
 struct ImportedRuns {
   RunLog log;
   double clock_start_s = 0;         // what was taken off every time of the recordings
@@ -142,5 +139,28 @@ struct RunFiles {
   std::string commands, poses, wheels, gyro;
 };
 RunFiles format_runs(const RunLog& log);
+
+// "*." in front: any path before.
+using Aliases = std::vector<std::string>;
+
+// "Vicon x [mm]" to "vicon.x"; paths and blanks become dots, units in brackets go.
+std::string plain_name(const std::string& name);
+
+// The first alias that a column has wins; empty: none has.
+std::string column_of(const LogTable& table, const Aliases& aliases);
+
+// Of a name, between what is no letter and no digit.
+bool has_word(const std::string& name, const std::string& word);
+
+// The unit in "v [km/h]" or "v (km/h)", where it is known.
+std::string unit_in_name(const std::string& name);
+
+// Two columns whose names differ by the side, left first; empty: there are none.
+std::vector<std::string> sides_of(const LogTable& table);
+
+// Adds a column for each two of which one has whole seconds and the other what goes beyond them, in
+// ns, as builtin_interfaces/Time has: "header.stamp" of "header.stamp.sec" and
+// "header.stamp.nanosec".  Not where there is one of that name.
+void join_times(LogTable* table);
 
 }  // namespace gapfarm

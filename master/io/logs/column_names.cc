@@ -1,5 +1,4 @@
 // What the names of columns say.
-#include "master/io/logs/column_names.h"
 
 #include <cctype>
 #include <regex>

@@ -7,7 +7,6 @@
 #include "common/math/statistics.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
-#include "master/io/logs/column_names.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,6 @@
 #include "common/math/statistics.h"
 #include "common/recordings/run.h"
 #include "master/io/logs/column_map.h"
-#include "master/io/logs/column_names.h"
 #include "master/io/logs/topics.h"
 
 namespace gapfarm {

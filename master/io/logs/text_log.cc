@@ -7,12 +7,11 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
-#include "common/trials/dialect.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
 #include "common/trials/text/mistakes.h"
 #include "master/io/logs/bags.h"
-#include "master/io/logs/column_names.h"
+#include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {

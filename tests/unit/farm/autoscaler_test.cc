@@ -1,10 +1,9 @@
-#include "master/farm/sites/autoscaler.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
 
+#include "master/farm/sites/fleet.h"
 #include "tests/bench/fleet_simulation.h"
 
 namespace gapfarm::autoscaler_test {

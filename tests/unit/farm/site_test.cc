@@ -1,5 +1,3 @@
-#include "master/farm/sites/site.h"
-
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -7,8 +7,8 @@
 
 #include "common/base/ranges.h"
 #include "common/recordings/run.h"
-#include "common/trials/dialect.h"
 #include "common/trials/files.h"
+#include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
 
 namespace gapfarm::tables_test {

@@ -6,7 +6,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "master/serve/pages.h"
 #include "master/store/answer_store.h"
 #include "master/store/records.h"
 #include "tests/unit/store/store_fixture.h"

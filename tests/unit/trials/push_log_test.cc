@@ -4,7 +4,6 @@
 
 #include "common/trials/read.h"
 #include "common/trials/trial.h"
-#include "common/trials/write.h"
 #include "tests/unit/trials/shared_data.h"
 #include "tests/unit/trials/trial_text.h"
 

@@ -10,7 +10,6 @@
 #include "common/trials/context.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
-#include "common/trials/write.h"
 #include "tests/unit/trials/shared_data.h"
 #include "tests/unit/trials/trial_text.h"
 

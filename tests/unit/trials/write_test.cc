@@ -1,5 +1,3 @@
-#include "common/trials/write.h"
-
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
