@@ -3,19 +3,13 @@
 #include <sodium.h>
 
 #include <array>
+#include <bit>
 #include <cassert>
-#include <cstring>
 
 namespace gapfarm {
 namespace {
 
 constexpr std::size_t kBytes = 16;
-
-std::string hex(const std::array<unsigned char, kBytes>& digest) {
-  std::array<char, 2 * kBytes + 1> text{};
-  sodium_bin2hex(text.data(), text.size(), digest.data(), digest.size());
-  return text.data();
-}
 
 }  // namespace
 
@@ -39,11 +33,7 @@ Hasher& Hasher::add(std::string_view bytes) {
   return *this;
 }
 
-Hasher& Hasher::add(double value) {
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &value, sizeof bits);
-  return add(bits);
-}
+Hasher& Hasher::add(double value) { return add(std::bit_cast<std::uint64_t>(value)); }
 
 Hasher& Hasher::add(std::uint64_t value) {
   std::array<unsigned char, 8> bytes{};
@@ -57,7 +47,8 @@ Hasher& Hasher::add(std::uint64_t value) {
 std::string Hasher::finish() {
   std::array<unsigned char, kBytes> digest{};
   crypto_generichash_final(&state_->blake, digest.data(), digest.size());
-  return hex(digest);
+  std::array<char, 2 * kBytes + 1> text{};
+  return sodium_bin2hex(text.data(), text.size(), digest.data(), digest.size());
 }
 
 std::string content_hash(std::string_view bytes) { return Hasher().add(bytes).finish(); }

@@ -23,22 +23,15 @@ Parameter choice(const char* key, std::vector<std::string> choices, const char* 
           0,   summary, std::move(choices)};
 }
 
-Effect effect(EffectStage stage, const char* name, unsigned context, const char* summary,
-              std::vector<Parameter> parameters, std::size_t strengths) {
-  return {name, stage, context, summary, std::move(parameters), strengths};
+constexpr auto maker_of(EffectStage stage) {
+  return [stage](const char* name, unsigned context, const char* summary,
+                 std::vector<Parameter> parameters, std::size_t strengths = 1) -> Effect {
+    return {name, stage, context, summary, std::move(parameters), strengths};
+  };
 }
-Effect drive(const char* name, unsigned context, const char* summary,
-             std::vector<Parameter> parameters, std::size_t strengths = 1) {
-  return effect(EffectStage::kDrive, name, context, summary, std::move(parameters), strengths);
-}
-Effect floor(const char* name, unsigned context, const char* summary,
-             std::vector<Parameter> parameters, std::size_t strengths = 1) {
-  return effect(EffectStage::kFloor, name, context, summary, std::move(parameters), strengths);
-}
-Effect camera(const char* name, unsigned context, const char* summary,
-              std::vector<Parameter> parameters, std::size_t strengths = 1) {
-  return effect(EffectStage::kCamera, name, context, summary, std::move(parameters), strengths);
-}
+constexpr auto drive = maker_of(EffectStage::kDrive);
+constexpr auto floor = maker_of(EffectStage::kFloor);
+constexpr auto camera = maker_of(EffectStage::kCamera);
 
 Effect in_spread(Effect effect) {
   effect.shows = EffectShows::kSpread;

@@ -16,18 +16,9 @@ namespace gapfarm {
 namespace {
 
 spdlog::level::level_enum spdlog_level(LogLevel level) {
-  switch (level) {
-    case LogLevel::kDebug:
-      return spdlog::level::debug;
-    case LogLevel::kInfo:
-      return spdlog::level::info;
-    case LogLevel::kWarn:
-      return spdlog::level::warn;
-    case LogLevel::kError:
-      return spdlog::level::err;
-    default:
-      return spdlog::level::off;
-  }
+  using namespace spdlog::level;
+  constexpr level_enum kLevels[] = {debug, info, warn, err, off};
+  return kLevels[static_cast<std::size_t>(level)];
 }
 
 std::string json_of(const nlohmann::json& value) { return json_text(value); }

@@ -91,14 +91,8 @@ struct Look {
 };
 
 Look look(const GapPart& part, int effect) {
-  switch (part.kind) {
-    case GapPart::Kind::kFloor:
-      return {"floor", "F"};
-    case GapPart::Kind::kUnnamed:
-      return {"unexplained", "?"};
-    case GapPart::Kind::kEffect:
-      break;
-  }
+  if (part.kind == GapPart::Kind::kFloor) return {"floor", "F"};
+  if (part.kind == GapPart::Kind::kUnnamed) return {"unexplained", "?"};
   return {std::to_string((effect - 1) % kHatchCount + 1), std::to_string(effect)};
 }
 

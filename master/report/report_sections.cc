@@ -18,25 +18,16 @@ struct VerdictLabels {
   const char* meaning;  // when the diagnosis has no headline of its own
 };
 
-VerdictLabels verdict_labels(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kEffect:
-      return {"verdict-effect", "◆", "Effect found", "A known effect explains the gap."};
-    case Verdict::kNone:
-      return {"verdict-none", "●", "No effect",
-              "The tuned simulation is as good as these data can show."};
-    case Verdict::kUnknown:
-      return {"verdict-unknown", "▲", "Cause unknown",
-              "There is a gap, and nothing in the catalogue explains it."};
-    case Verdict::kEffectAndUnknown:
-      return {"verdict-both", "◆▲", "Effect found, more remains",
-              "A known effect explains a part of the gap; something else is there too."};
-    case Verdict::kUnusable:
-      return {"verdict-unusable", "✕", "Not usable as it is",
-              "Something is wrong with the log or with its config; nothing was simulated."};
-  }
-  return {"", "", "", ""};
-}
+// In the order of Verdict.
+constexpr VerdictLabels kVerdicts[] = {
+    {"verdict-effect", "◆", "Effect found", "A known effect explains the gap."},
+    {"verdict-none", "●", "No effect", "The tuned simulation is as good as these data can show."},
+    {"verdict-unknown", "▲", "Cause unknown",
+     "There is a gap, and nothing in the catalogue explains it."},
+    {"verdict-both", "◆▲", "Effect found, more remains",
+     "A known effect explains a part of the gap; something else is there too."},
+    {"verdict-unusable", "✕", "Not usable as it is",
+     "Something is wrong with the log or with its config; nothing was simulated."}};
 
 std::string tile(const std::string& title, const GapFigures& figures, bool changed,
                  const std::string& unit) {
@@ -146,7 +137,7 @@ HtmlRow screened_row(const Diagnosis& diagnosis, const Screened& s, double large
 }  // namespace
 
 std::string summary_section(const Diagnosis& diagnosis) {
-  const VerdictLabels labels = verdict_labels(diagnosis.verdict);
+  const VerdictLabels& labels = kVerdicts[static_cast<std::size_t>(diagnosis.verdict)];
   std::string html = fmt::format(
       R"(<section id="summary"><p class="verdict {}"><span aria-hidden="true">{}</span> {}</p><h1 data-file="diagnosis">{}</h1>)",
       labels.css_class, labels.sign, labels.title,

@@ -127,14 +127,9 @@ std::vector<DriveSample> drive_samples(const Problem& problem) {
   for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
     const Trial& trial = problem.log.trials[i];
     const CommandSpec c = resolved_command(trial, problem.commands);
-    DriveSample s;
-    s.trial = i;
-    s.forward_s = (c.left + c.right) / 2 * c.duration_s;
-    s.turn_s = (c.right - c.left) * c.duration_s;
-    s.most_s = std::max(std::abs(c.left), std::abs(c.right)) * c.duration_s;
-    s.X_WS = trial.X_WS;
-    s.X_WE = trial.X_WE;
-    samples.push_back(s);
+    const double most = std::max(std::abs(c.left), std::abs(c.right));
+    samples.push_back({i, (c.left + c.right) / 2 * c.duration_s, (c.right - c.left) * c.duration_s,
+                       most * c.duration_s, trial.X_WS, trial.X_WE});
   }
   return samples;
 }

@@ -154,10 +154,11 @@ class MapReader {
   }
 
  private:
+  void refuse(const TomlSection& section, const std::string& text) {
+    errors_.add(section.table().source().begin, section.name() + text);
+  }
+
   void check_times(const TomlSection& section, TableMap& map) {
-    const auto refuse = [&](const std::string& text) {
-      errors_.add(section.table().source().begin, section.name() + text);
-    };
     for (MappedColumn& c : map.columns) {
       if (c.role != "dt" || map.find("t") != nullptr) continue;
       map.intervals = true;
@@ -168,14 +169,14 @@ class MapReader {
         c.column = map.columns[&c == &map.columns.front() ? map.columns.size() - 1 : 0].column;
     }
     if (map.find("t") == nullptr) {
-      refuse(
-          " has no t, expected the column of the times (or dt, of the seconds since the row "
-          "before; dt = 0.2 where every row lasts so long)");
+      refuse(section,
+             " has no t, expected the column of the times (or dt, of the seconds since the row "
+             "before; dt = 0.2 where every row lasts so long)");
     }
     if (map.increments && !map.keep.empty()) {
-      refuse(
-          " has increments and keep, expected one of them: without its row an increment leads "
-          "nowhere");
+      refuse(section,
+             " has increments and keep, expected one of them: without its row an increment leads "
+             "nowhere");
     }
   }
 
@@ -183,15 +184,14 @@ class MapReader {
     const auto is_missing = [&](const std::string& role) { return map.find(role) == nullptr; };
     const std::string missing = joined(filtered(map.noise(), is_missing));
     if (!missing.empty()) {
-      errors_.add(section.table().source().begin, section.name() + " has no " + missing +
-                                                      ", expected all of " + map.noise().front() +
-                                                      " to " + map.noise().back() + " or none");
+      refuse(section, " has no " + missing + ", expected all of " + map.noise().front() + " to " +
+                          map.noise().back() + " or none");
     }
     if (!map.noise().empty() && !map.increments) {
-      errors_.add(section.table().source().begin,
-                  section.name() +
-                      " has covariances of poses, expected increments = true: those "
-                      "of poses in the world are read off their scatter");
+      refuse(
+          section,
+          " has covariances of poses, expected increments = true: those of poses in the world are "
+          "read off their scatter");
     }
   }
 

@@ -74,9 +74,7 @@ class Db3Bag {
     while ((code = sqlite3_step(rows.get())) == SQLITE_ROW) {
       BagTopic* topic = find_in(by_id_, sqlite3_column_int64(rows.get(), 0));
       if (!topic) return broken();
-      const sqlite3_int64 ns = sqlite3_column_int64(rows.get(), 1);
-      const double t =
-          static_cast<double>(ns / 1'000'000'000) + 1e-9 * static_cast<double>(ns % 1'000'000'000);
+      const double t = seconds_of(static_cast<std::uint64_t>(sqlite3_column_int64(rows.get(), 1)));
       const auto* data = static_cast<const char*>(sqlite3_column_blob(rows.get(), 2));
       const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows.get(), 2));
       const std::string_view bytes(data == nullptr ? "" : data, data == nullptr ? 0 : size);

@@ -86,10 +86,8 @@ class McapReader : BagRecords {
 
   Status schema(std::uint64_t at, ByteCursor& cursor) {
     const auto id = cursor.number<std::uint16_t>();
-    Schema read;
-    read.name = cursor.text();
-    read.encoding = cursor.text();
-    read.text = cursor.text();
+    const auto word = [&] { return std::string(cursor.text()); };
+    Schema read = {word(), word(), word()};  // in this order
     if (!cursor.good()) return broken(at);
     schemas_.emplace(id, std::move(read));
     return {};
@@ -104,16 +102,16 @@ class McapReader : BagRecords {
     if (!cursor.good()) return broken(at);
     if (channels_.count(id) != 0) return {};
     if (const Schema* found = find_in(schemas_, schema_id)) {
-      const Schema& s = *found;
-      read.type = s.name;
+      const auto& [name, text_encoding, definition] = *found;
+      read.type = name;
       read.wire = encoding == "ros1" ? MessageWire::kRos1 : MessageWire::kCdr;
-      const bool text = s.encoding == "ros1msg" || s.encoding == "ros2msg";
-      const bool serves = serves_ground_robots(s.name), cdr = encoding == "cdr";
-      if ((encoding == "ros1" || cdr) && text && serves && !s.text.empty()) {
-        ASSIGN_OR_RETURN(read.schema, BagRecords::schema(at, s.name, s.text));
-      } else if (cdr && serves && s.text.empty()) {
+      const bool text = text_encoding == "ros1msg" || text_encoding == "ros2msg";
+      const bool serves = serves_ground_robots(name), cdr = encoding == "cdr";
+      if ((encoding == "ros1" || cdr) && text && serves && !definition.empty()) {
+        ASSIGN_OR_RETURN(read.schema, BagRecords::schema(at, name, definition));
+      } else if (cdr && serves && definition.empty()) {
         // rosbag2 found no definition; as in a .db3 the type's name is to do.
-        if (auto known = MessageSchema::known(s.name)) read.schema = *std::move(known);
+        if (auto known = MessageSchema::known(name)) read.schema = *std::move(known);
       }
       if (serves && !read.schema) read.type += ", " + encoding + " without a ROS definition";
     }
@@ -133,9 +131,7 @@ class McapReader : BagRecords {
       return error(at, "a message of channel " + std::to_string(id),
                    "its channel record before it");
     }
-    const double t = static_cast<double>(log_time / 1'000'000'000) +
-                     1e-9 * static_cast<double>(log_time % 1'000'000'000);
-    return add(at, *channel, t, cursor.rest());
+    return add(at, *channel, seconds_of(log_time), cursor.rest());
   }
 
   std::map<std::uint16_t, Schema> schemas_;

@@ -77,16 +77,10 @@ namespace {
 // Nanoseconds of a clock, micrometres of a pose: more digits are noise.
 std::string digits(double value, int decimals) {
   std::string out = formatted("%.*f", decimals, value);
-  while (out.find('.') != out.npos && (out.back() == '0' || out.back() == '.')) {
-    const bool point = out.back() == '.';
-    out.pop_back();
-    if (point) break;
-  }
+  out.erase(out.find_last_not_of('0') + 1);
+  if (out.ends_with('.')) out.pop_back();
   return out == "-0" ? "0" : out;
 }
-
-// Covariances have no digits that count from the point.
-std::string short_number(double value) { return formatted("%.6g", value); }
 
 std::string format_commands(const std::vector<std::string>& channels, const RunLog& log,
                             std::vector<CommandRow> LoggedRun::*rows) {
@@ -168,7 +162,8 @@ RunFiles format_runs(const RunLog& log) {
                      "," + digits(X.y, places) + "," + digits(X.theta, places + 1);
       const Eigen::Matrix3d noise = row.noise.value_or(Eigen::Matrix3d::Zero());
       for (Eigen::Index r = 0; r < 3 && noisy; ++r) {
-        for (Eigen::Index c = r; c < 3; ++c) files.poses += "," + short_number(noise(r, c));
+        // Covariances have no digits that count from the point.
+        for (Eigen::Index c = r; c < 3; ++c) files.poses += formatted(",%.6g", noise(r, c));
       }
       files.poses += "\n";
       before = row.X_WM;

@@ -70,12 +70,12 @@ Status Topics::put(const std::string& topic, const std::string& type, double t_s
 Status Topics::add(const BagTopic& of, double t_s, std::string_view bytes) {
   if (!of.schema) return skip(of);
   const std::string &topic = of.name, &type = of.type;
-  Result<MessageContent> content = of.schema->decode(bytes, of.wire);
-  if (!content) return Error{"topic " + quoted_word(topic) + ": " + content.error().message};
+  ASSIGN_OR_RETURN(MessageContent content,
+                   under("topic " + quoted_word(topic), of.schema->decode(bytes, of.wire)));
   const std::string_view name = std::string_view(type).substr(type.rfind('/') + 1);
   if (name == "String") {
-    const auto data = content->texts.find("data");
-    if (data == content->texts.end() || topic.find("robot_description") == topic.npos) {
+    const auto data = content.texts.find("data");
+    if (data == content.texts.end() || topic.find("robot_description") == topic.npos) {
       return skip(of);
     }
     recording_.robot_description = data->second;
@@ -83,23 +83,23 @@ Status Topics::add(const BagTopic& of, double t_s, std::string_view bytes) {
   }
   if (name == "JointState") {
     std::string array, index;
-    for (auto& [path, value] : content->numbers) {
+    for (auto& [path, value] : content.numbers) {
       if (!element_of(path, array, index)) continue;
-      const auto joint = content->texts.find("name[" + index + "]");
-      path = array + "." + (joint == content->texts.end() ? index : joint->second);
+      const auto joint = content.texts.find("name[" + index + "]");
+      path = array + "." + (joint == content.texts.end() ? index : joint->second);
     }
   }
-  if (name != "TFMessage") return put(topic, type, t_s, content->numbers, *content);
+  if (name != "TFMessage") return put(topic, type, t_s, content.numbers, content);
   // One message holds transforms of many frames.
   std::map<std::string, std::vector<std::pair<std::string, double>>> frames;  // by path
-  for (const auto& [path, value] : content->numbers) {
+  for (const auto& [path, value] : content.numbers) {
     const std::size_t dot = path.find("].");
     if (dot == path.npos) continue;
     frames[path.substr(0, dot + 2)].emplace_back(path.substr(dot + 2), value);
   }
   for (const auto& [at, numbers] : frames) {
-    const std::string table = topic + ":" + text_in(*content, at + "child_frame_id");
-    RETURN_IF_ERROR(put(table, type, t_s, numbers, *content, at));
+    const std::string table = topic + ":" + text_in(content, at + "child_frame_id");
+    RETURN_IF_ERROR(put(table, type, t_s, numbers, content, at));
   }
   return {};
 }
@@ -177,9 +177,7 @@ Result<MessageSchema> BagRecords::schema(std::uint64_t at, const std::string& ty
 
 Status BagRecords::add(std::uint64_t at, const BagTopic& topic, double t_s,
                        std::string_view message) {
-  const Status added = topics_.add(topic, t_s, message);
-  if (added) return added;
-  return Error{file_ + ":" + std::to_string(at + 1) + ": " + added.error().message};
+  return under(file_ + ":" + std::to_string(at + 1), topics_.add(topic, t_s, message));
 }
 
 }  // namespace gapfarm

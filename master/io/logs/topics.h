@@ -16,7 +16,6 @@
 namespace gapfarm {
 
 // ROS messages: their definitions, and the numbers in their bytes.
-
 enum class MessageWire { kRos1, kCdr };
 
 // What stands in one message, by path: "pose.position.x", "velocity[2]", "header.stamp" (s).
@@ -100,6 +99,12 @@ class Topics {
   std::size_t numbers_ = 0;
 };
 
+// Seconds of a time that bags keep in ns since 1970: with the digits that a double has for both.
+inline double seconds_of(std::uint64_t ns) {
+  constexpr std::uint64_t kSecond = 1'000'000'000;
+  return static_cast<double>(ns / kSecond) + 1e-9 * static_cast<double>(ns % kSecond);
+}
+
 // Takes values off the front of bytes, little-endian; after one that is not there nothing is good.
 class ByteCursor {
  public:
@@ -149,8 +154,6 @@ class BagRecords {
   const char* remedy_;
   Topics topics_;
 };
-
-// Which tables of a bag have the robot's poses in the world, and which only odometry's.
 
 // What wheels made up: by the frame of its poses, else by its type.
 bool is_odometry(const LogTable& table);

@@ -18,19 +18,14 @@ bool differ(double a, double b) {
 
 std::string metres(double value) { return format_double(std::round(value * 1e5) / 1e5) + " m"; }
 
-void take(const std::vector<DriveFacts>& facts, const char* name, std::optional<double>& to) {
+template <class Number>
+void take(const std::vector<DriveFacts>& facts, const char* name, Number& to) {
   for (const DriveFacts& fact : facts) {
     if (const StatedNumber* stated = fact.number(name)) {
       to = stated->value;
       return;
     }
   }
-}
-
-void take(const std::vector<DriveFacts>& facts, const char* name, double& to) {
-  std::optional<double> value;
-  take(facts, name, value);
-  if (value) to = *value;
 }
 
 // What the URDF's own geometry says about a size; none where it says nothing.
@@ -264,14 +259,11 @@ std::vector<std::string> compare_readings(const RobotReading& a, const std::stri
     report("the mass", mass_a, mass_b, " kg");
   }
   const Measured m = measure(a), n = measure(b);
-  if (m.radius && n.radius && differ(*m.radius, *n.radius)) {
-    report("the wheels' radius", *m.radius, *n.radius, " m");
-  }
-  if (m.separation && n.separation && differ(*m.separation, *n.separation)) {
-    report("the wheels' separation", *m.separation, *n.separation, " m");
-  }
-  if (m.wheelbase && n.wheelbase && differ(*m.wheelbase, *n.wheelbase)) {
-    report("the wheelbase", *m.wheelbase, *n.wheelbase, " m");
+  for (const auto& [what, size] : {std::pair{"the wheels' radius", &Measured::radius},
+                                   {"the wheels' separation", &Measured::separation},
+                                   {"the wheelbase", &Measured::wheelbase}}) {
+    const auto &x = m.*size, &y = n.*size;
+    if (x && y && differ(*x, *y)) report(what, *x, *y, " m");
   }
   if (a.robot.drive != b.robot.drive) {
     all.push_back("the drive is " + drive_names()[static_cast<std::size_t>(a.robot.drive)] +

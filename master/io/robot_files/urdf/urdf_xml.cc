@@ -31,12 +31,12 @@ class Reader : private XmlReader {
     std::set<std::string> declared = {"xml", "xacro"};
     read_prefixes(*root, declared, 0);
     model_.name = attribute(*root, "name");
-    for (const XMLElement* child = root->FirstChildElement(); child != nullptr && !error();
+    for (const XMLElement* child = root->FirstChildElement(); child != nullptr && !error_;
          child = child->NextSiblingElement()) {
       read_child(*child);
     }
-    if (error()) return *error();
-    if (expanded()) {
+    if (error_) return *error_;
+    if (expanded_) {
       note(root->GetLineNum(),
            "the file holds xacro expressions; their default values were put in. To be sure, " +
                std::string(kExpand));
@@ -58,8 +58,8 @@ class Reader : private XmlReader {
       if (name == "xacro:property") value = child->Attribute("value");
       if (name == "xacro:arg") value = child->Attribute("default");
       // An argument's own name may be that of the property made of it; the argument comes first.
-      if (value != nullptr && !(name == "xacro:property" && names().count(key) != 0)) {
-        names()[key] = value;
+      if (value != nullptr && !(name == "xacro:property" && names_.count(key) != 0)) {
+        names_[key] = value;
       }
     }
   }

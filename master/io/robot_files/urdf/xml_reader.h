@@ -38,7 +38,7 @@ class XmlReader {
   // All, or those of a name.
   static std::vector<const Element*> children(const Element& of, const char* name = nullptr);
 
-  // With expressions put in where names() settle them.  Empty when it is not there.
+  // With expressions put in where names_ settle them.  Empty when it is not there.
   std::string attribute(const Element& element, const char* name);
   // An error when it is empty or still an expression.
   std::string needed(const Element& element, const char* name);
@@ -52,14 +52,8 @@ class XmlReader {
   // Of the child <origin>; the identity without one.
   Eigen::Isometry3d origin(const Element& parent, std::string& unread);
 
-  XacroNames& names() { return names_; }
-  bool expanded() const { return expanded_; }
-  const std::string& file() const { return file_; }
-  const std::optional<Error>& error() const { return error_; }
-
- private:
   std::string file_;
-  XacroNames names_;
+  XacroNames names_;  // settled so far
   bool expanded_ = false;
   std::optional<Error> error_;
 };
