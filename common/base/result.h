@@ -89,7 +89,6 @@ Result<T> under(const std::string& where, Result<T> result) {
 }  // namespace gapfarm
 
 // What passes errors on, in one line each.
-
 #define GAPFARM_JOINED_(a, b) a##b
 #define GAPFARM_JOINED(a, b) GAPFARM_JOINED_(a, b)
 #define GAPFARM_RESULT GAPFARM_JOINED(result_, __LINE__)

@@ -78,8 +78,6 @@ std::string nearest_word(std::string_view word, std::span<const std::string> kno
 // "; did you mean 'forward'?" or, when nothing is near, "; known: a, b, c".
 std::string suggestion(std::string_view word, std::span<const std::string> known);
 
-// Numbers as people read them.
-
 // The number that `value` is when it is written with so many significant digits: small values do
 // not vanish, and its shortest text is no longer.  0 digits: as it is.
 inline double rounded_to_digits(double value, int digits) {
@@ -90,8 +88,6 @@ inline double rounded_to_digits(double value, int digits) {
   std::from_chars(text, end.ptr, value);
   return value;
 }
-
-// Times, shares and numbers in words.
 
 // "1 h 02 min", "3 min 20 s", "12 s", "0.4 s"; "?" for what is no time.
 std::string format_duration(double seconds);

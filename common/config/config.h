@@ -37,7 +37,6 @@ Status check_evolvable(const Config& config);
 Status check_moves(const std::string& scenario, const std::string& path);
 
 // Comparisons: one config with several variants of it, to be run side by side.
-
 struct Variant {
   std::string name;
   Config config;

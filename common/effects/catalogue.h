@@ -80,7 +80,6 @@ std::string kind_of(const std::string& effect);
 std::string second_of(const std::string& effect);
 
 // How far the heading that was logged of a start may be turned from the robot's.
-
 struct StartTurn {
   double weight = 1;
   double turn_rad = 0;  // of the logged heading, to the left of the robot's

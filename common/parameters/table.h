@@ -89,8 +89,6 @@ double encode_gene(const ParameterTable& table, const Gene& gene, double value);
 void decode(const ParameterTable& table, const std::vector<Gene>& genes, const Genome& genome,
             ParameterValues& values);
 
-// Base rows of scenario `push`.
-
 // In table order; `values[row_of(Push::kGroundFriction)]` is the friction of piece and table.
 enum class Push : std::size_t {
 #define ROW(name, row) name,
@@ -107,8 +105,6 @@ const ParameterTable& push_table();
 // Whether `model` carries pieces on their whole face, so that `pressure` takes the place of
 // `shape_factor`.
 bool rests_on_its_face(const ParameterValues& values);
-
-// The parameter table of scenario `racquetball`.
 
 // Base rows in table order.  Lengths in m, as everywhere; the court is 20 m wide in each direction,
 // like the one of the published paths.

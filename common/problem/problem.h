@@ -188,7 +188,6 @@ std::string serialise(const v1::Problem& message);
 std::string problem_hash(const v1::Problem& message);
 
 // What a problem's log is read by: its commands' names, and its runs from their files.
-
 std::vector<std::string> command_names(const std::vector<CommandSpec>& commands);
 
 // Reads commands.csv and poses.csv of each folder, and wheels.csv where it is, one after another.

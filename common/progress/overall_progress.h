@@ -118,7 +118,6 @@ class WorkerWait {
 };
 
 // What a long command has found so far, for those who watch it: what it ends with may differ.
-
 struct Finding {
   std::string about;  // "the noise": a later finding about the same takes its place
   std::string text;   // sentences
@@ -130,7 +129,6 @@ struct Finding {
 using OnFinding = std::function<void(Finding)>;
 
 // Which stage is on, and how long each took.
-
 class StageClock {
  public:
   explicit StageClock(std::function<void(const std::string&)> on_stage)

@@ -218,8 +218,6 @@ struct RobotSize {
   bool operator==(const RobotSize&) const = default;
 };
 
-// Robot files: robot.toml, read and written (docs/formats.md).
-
 // A completed robot (complete_robot()).  The error lists everything that is wrong, a line each:
 // "file:line:column: sentence", with "did you mean" for unknown words.
 Result<GroundRobot> parse_robot(std::string_view text, const std::string& path);

@@ -77,8 +77,6 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
 // (a battery that sags, a clock that drifts) is omitted.
 GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics);
 
-// Where a search of a ground robot's values begins.
-
 // The problem's values with those of its genes that the robot's own kinematics show (radii, sizes,
 // clock, lag, marker, steering) as fitted and kept within the genes' ranges.
 ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted);

@@ -19,8 +19,6 @@
 
 namespace gapfarm {
 
-// Parts of a floor on which wheels travel less far than elsewhere, or farther.
-
 // Where a robot is and which way it heads.
 struct RobotPlace {
   Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
@@ -62,8 +60,6 @@ class FloorParts {
   Eigen::Vector2d origin_m_;
   Parts parts_, known_;
 };
-
-// How omni and mecanum wheels move a robot: the inverse of its wheels' geometry, with slip.
 
 // Traction 1: e1 (v + w x p) = s of every driven wheel, in the least-squares sense, e1 being the
 // axle of the roller on the floor.  Where rollers resist being rolled aside, the forces on all
@@ -166,7 +162,6 @@ class KinematicBody {
 };
 
 // Runs and their windows as kinematics are asked about them: many times, at other values.
-
 class KinematicPaths {
  public:
   // Both outlive it.

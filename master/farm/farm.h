@@ -16,8 +16,6 @@
 
 namespace gapfarm {
 
-// What stands on a cluster for a master, as its fleet last reported it.
-
 // Counts are workers.
 struct FleetStatus {
   std::string name;
@@ -29,7 +27,6 @@ struct FleetStatus {
 };
 
 // Who a worker is, for whoever keeps its answers longer than it stays.
-
 using WorkerId = std::uint64_t;
 
 struct WorkerIdentity {

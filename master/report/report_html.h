@@ -42,8 +42,6 @@ GapSplit split_gap(const Diagnosis& diagnosis, GapUnit unit);
 // The section of the page.
 std::string gap_split_html(const Diagnosis& diagnosis);
 
-// Sections of the report's page, as HTML.  Empty when the diagnosis has nothing for them.
-
 // Verdict, headline, what was found in words, and the three figures that matter.
 std::string summary_section(const Diagnosis& diagnosis);
 
@@ -58,8 +56,6 @@ std::string shrinkage_section(const Diagnosis& diagnosis);
 std::string next_section(const Diagnosis& diagnosis);
 std::string cautions_section(const Diagnosis& diagnosis);
 std::string provenance_section(const Diagnosis& diagnosis);
-
-// A table of parameters before and after, and what to paste into a config.
 
 // How a page calls a column, and which word of the glossary (term()) says what it is.
 struct TermColumn {

@@ -143,9 +143,6 @@ void summarise_fitness(StoredGeneration& generation, bool higher_is_better);
 // outcome, fitness and number of scores, by their bits.  Times and workers are omitted.
 std::string generation_digest(const std::string& previous, const StoredGeneration& generation);
 
-// What a long command that is no run says about itself, in the folder where it keeps its
-// simulations: for `gapfarm status`, live and dead.
-
 // simulations.sqlite of a command's folder.
 std::filesystem::path answer_file(const std::filesystem::path& folder);
 

@@ -18,7 +18,6 @@
 namespace gapfarm {
 
 // What is wrong with a log or with its fit to a config, as a person would question it.
-
 enum class Severity {
   kNote,      // worth knowing; a diagnosis goes on
   kWarning,   // nothing is named because of it
@@ -98,8 +97,6 @@ const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, dou
 // repeats, and where there are so many that there is no knowing which readings are false.
 std::vector<std::size_t> false_readings(const Problem& problem);
 
-// Checks of logs of pushed pieces.
-
 // Samples of the fingers' ways between a jump there and one back (check_jumps()).
 struct TipJumps {
   std::vector<std::size_t> trials;           // that have some, ascending
@@ -110,9 +107,6 @@ TipJumps check_tip_jumps(const TrialLog& log);
 // Nothing moved; or finger and pieces are not in one frame and unit, or not of the same pushes.
 void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings);
 
-// What a careful person would check before simulating anything: units, axes, clocks, copies, too
-// little of everything, a robot that the scenario cannot be.
-
 // The worst first.  A pure function of log and config that takes milliseconds; robust against a few
 // per cent of wild rows.  `impossible`: set to the trials that cannot be, ascending: drives for
 // which the robot would have had to move at more than twice the log's own speed and 30 cm beyond
@@ -122,7 +116,6 @@ std::vector<SanityFinding> check_sanity(const Problem& problem,
                                         std::vector<std::size_t>* impossible = nullptr);
 
 // What is wrong with logged runs of any ground robot.
-
 struct RunChecks {
   std::vector<SanityFinding> findings;
   // Which say nothing of how commands move a robot, or what another has said: ascending.
@@ -151,7 +144,6 @@ RunChecks check_jumps(const RunLog& log);
 RunLog without(RunLog log, const RunChecks& checks);
 
 // Checks of logs of drives.
-
 struct DriveSample {
   std::size_t trial = 0;  // of the log
   double forward_s = 0;   // mean of both sides' duties times the duration: + is ahead
@@ -205,9 +197,6 @@ bool check_related(const std::vector<DriveSample>& samples, std::vector<SanityFi
 // Turns faster than the sides' speeds and their distance allow without any slip.
 void check_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                    std::vector<SanityFinding>* findings);
-
-// Whether positions, headings and commands have the same sense: mirrored and swapped axes, headings
-// that count clockwise, sides reported the wrong way round.
 
 // The one thing that is the wrong way round, named by Occam: none where all agree or nothing says.
 std::optional<SanityFinding> check_axes(const std::vector<DriveSample>& samples,

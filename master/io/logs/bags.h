@@ -16,8 +16,6 @@
 
 namespace gapfarm {
 
-// A recording as it is written: named columns of numbers, whatever file they came from.
-
 // One topic of a bag, or one text file.  Row-major; NaN where the file has a blank or no number.
 struct LogTable {
   std::string source;                // file, and topic where it has several
@@ -92,7 +90,6 @@ Result<Recording> read_recording(const std::string& path, bool skip_invalid = fa
 Result<std::string> decompress(std::string_view bytes, const std::string& how, std::uint64_t size);
 
 // Messages as JSON in an MCAP file (https://mcap.dev/spec), for Foxglove and PlotJuggler.
-
 class McapWriter {
  public:
   // A topic whose messages are of this JSON Schema.  At most 65535.

@@ -61,9 +61,6 @@ std::vector<double> standing_loads(const GroundRobot& robot);
 std::vector<double> wheel_loads(const std::vector<Eigen::Vector2d>& points,
                                 const Eigen::Vector2d& com, double weight_n);
 
-// Which links of a URDF are wheels, casters and steering: found by axes, shapes, the floor and what
-// controllers name, and only then by names.
-
 // Frame B: the URDF's root link.
 struct ChassisWheel {
   const UrdfJoint* joint = nullptr;    // it rolls about this one
@@ -122,8 +119,6 @@ struct DriveGuess {
 Result<DriveGuess> guess_drive(const UrdfModel& model, const Chassis& chassis,
                                const std::vector<DriveFacts>& facts);
 
-// What controllers and plugins state, put into a robot and held against its URDF.
-
 // What DriveFacts and a controller both name.
 inline constexpr std::pair<const char*, std::optional<double> ControllerKinematics::*>
     kControllerSizes[] = {{"wheel_separation", &ControllerKinematics::wheel_separation_m},
@@ -149,8 +144,6 @@ void compare_facts(const std::vector<DriveFacts>& facts, RobotReading& reading);
 std::vector<std::string> compare_readings(const RobotReading& a, const std::string& file_a,
                                           const RobotReading& b, const std::string& file_b);
 
-// What was understood of a robot, for a terminal, for programs and as a picture.
-
 // A page of text: drive with its evidence, wheels with places, radii, loads and sources, masses,
 // controller, disagreements, remarks.  `completed`: the robot after complete_robot(), for what was
 // assumed; its notes are shown.
@@ -162,8 +155,6 @@ std::string describe_robot_json(const RobotReading& reading, const GroundRobot& 
 
 // The robot from above as SVG: outlines, wheels, axles, loads, centre of mass, a scale.
 std::string draw_robot(const RobotReading& reading, const GroundRobot& completed);
-
-// A config for a robot and a log of it, ready to run.
 
 // What a config says of where it comes from and what it is about, as it is to stand there.
 struct RobotConfigTexts {

@@ -49,8 +49,6 @@ std::string line_chart(const LineChart& chart);
 std::string line_charts(const std::vector<LineChart>& charts, std::size_t across,
                         const std::string& title = "", const std::string& subtitle = "");
 
-// The picture of measured against simulated end poses (`poses.svg`).
-
 // Predicted end poses of one command.
 struct PoseCloud {
   std::string label;    // "before", "after"

@@ -197,8 +197,6 @@ std::string run_html(const RunReport& report);
 // follows the best and the bulk of the medians; what is worse is cut off at the frame.
 std::string fitness_chart(const RunReport& report);
 
-// What a run's page says of how it went on: operators, populations, genomes, the farm.
-
 // All its numbers that are not whole with no more digits than plots can show.
 Json rounded(Json json, int digits = kPlotDigits);
 
