@@ -189,6 +189,7 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
                                                 const GroundSearch& search) {
   const WindowFit& file = search.chain.front();
   if (mean(search.fit.nats) - mean(file.nats) < closed_by_fault()) return std::nullopt;
+  const double as_it_stands = fitter.hold({}, {}).objective;
   std::optional<Candidate> best;
   for (std::size_t i = 0; i < search.catalogue.size(); ++i) {
     const auto is_held = [&](const KinematicRow& row) {
@@ -202,7 +203,7 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     c.held_out = fit_held_out(fitter, alone.rows, alone.values);
     c.before = file;
     c.held_out_gain = held_out_gain(fitter.windows(), c.held_out, file, work.seed);
-    c.offer.gain = alone.objective - fitter.hold({}, {}).objective;
+    c.offer.gain = alone.objective - as_it_stands;
     if (c.held_out_gain.lo < closed_by_fault()) continue;
     if (best && !(c.held_out_gain.mean > best->held_out_gain.mean)) continue;
     values = search.fit.values;
