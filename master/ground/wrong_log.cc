@@ -1,4 +1,6 @@
 // Logs that are the wrong way round, or in another unit.
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -24,6 +26,9 @@ GroundHypothesis fault(const std::string& name, std::vector<std::string> aliases
 }
 
 constexpr double kMostTimes = 10'000;  // a run's clock may have been set in between
+// Of controllers, as people set them.
+constexpr double kTimeouts_s[] = {0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5,
+                                  0.6, 0.75, 0.8, 1,    1.2, 1.5, 2};
 
 // Changes the values of every row of commands.
 PutRight change_commands(std::function<void(std::vector<double>&)> change) {
@@ -67,21 +72,37 @@ PutRight change_poses(const Eigen::Matrix3d& L, double turn = 0) {
   };
 }
 
-// Repeats each command every `step_s`, until the next or the last pose, as its sender did.
-PutRight hold_commands(double step_s) {
-  return [step_s](RunLog* log) {
+// Puts rows in place of each command, as it acts from then on until the next or the last pose.
+PutRight act_out(
+    std::function<void(const CommandRow&, double until_s, std::vector<CommandRow>*)> act) {
+  return [act = std::move(act)](RunLog* log) {
     for (LoggedRun& run : log->runs) {
-      std::vector<CommandRow> held;
+      std::vector<CommandRow> acted;
       for (std::size_t i = 0; i < run.commands.size(); ++i) {
         const CommandRow& row = run.commands[i];
         const double last_s = run.poses.empty() ? row.t_s : run.poses.back().t_s;
-        const double end_s = i + 1 < run.commands.size() ? run.commands[i + 1].t_s : last_s;
-        const double times = std::clamp((end_s - row.t_s) / step_s, 0.0, kMostTimes);
-        for (int k = 0; k <= times; ++k) held.push_back({row.t_s + k * step_s, row.values});
+        act(row, i + 1 < run.commands.size() ? run.commands[i + 1].t_s : last_s, &acted);
       }
-      run.commands = std::move(held);
+      run.commands = std::move(acted);
     }
   };
+}
+
+// Repeats each command every `step_s`, as its sender did.
+PutRight hold_commands(double step_s) {
+  return act_out([step_s](const CommandRow& row, double until_s, std::vector<CommandRow>* to) {
+    const double times = std::clamp((until_s - row.t_s) / step_s, 0.0, kMostTimes);
+    for (int k = 0; k <= times; ++k) to->push_back({row.t_s + k * step_s, row.values});
+  });
+}
+
+// Stops the robot so long after each command.
+PutRight stop_after(double timeout_s) {
+  return act_out([timeout_s](const CommandRow& row, double until_s, std::vector<CommandRow>* to) {
+    to->push_back(row);
+    const double stops_s = row.t_s + timeout_s;
+    if (stops_s < until_s) to->push_back({stops_s, std::vector<double>(row.values.size(), 0.0)});
+  });
 }
 
 using ChannelPairs = std::vector<std::pair<std::size_t, std::size_t>>;
@@ -197,11 +218,22 @@ Faults wrong_commands(const GroundRobot& robot) {
     if (!contains(kOfNoWheel, channel)) continue;
     const bool turns = channel == "steering" || channel == "omega";
     turn_column(turns ? "steering_reversed" : "command_reversed", c);
+    if (turns || channel == "vy") continue;
+    all.back().aliases.emplace_back("heading_turned");
+    all.back().remedy += " If the tracked point heads backward instead, state the marker's yaw.";
   }
-  if (const auto& timeout_s = robot.motors.command_timeout_s) {
+  const auto& stated_s = robot.motors.command_timeout_s;
+  if (stated_s) {
     all.push_back(fault("command_timeout", {"commands_on_change"},
                         "commands that hold until the next (their log keeps changes alone)",
-                        "Give no cmd_vel_timeout with such a log.", hold_commands(*timeout_s)));
+                        "Give no cmd_vel_timeout with such a log.", hold_commands(*stated_s)));
+  }
+  for (const double timeout_s : kTimeouts_s) {
+    if (stated_s || robot.measured) break;
+    all.push_back(fault("command_timeout", {"commands_on_change"},
+                        fmt::format("commands that act for {:g} s and no longer", timeout_s),
+                        fmt::format("Give the robot's file cmd_vel_timeout = {:g}.", timeout_s),
+                        stop_after(timeout_s)));
   }
   return all;
 }
@@ -259,9 +291,10 @@ constexpr WrongPoses kWrongPoses[] = {
     {"heading_turned", "marker_yaw", "heading_offset",
      "headings that count from another axis, -90 degrees on", "State the marker's yaw.", 1, 1, 1,
      -pi / 2, false, true},
-    {"heading_turned", "marker_yaw", "heading_offset",
-     "headings that count from another axis, 180 degrees on", "State the marker's yaw.", 1, 1, 1,
-     pi, false, true}};
+    {"heading_turned", "marker_yaw", "command_reversed",
+     "headings that count from another axis, 180 degrees on",
+     "State the marker's yaw, or turn the sign of commands ahead if the robot drove backward.", 1,
+     1, 1, pi, false, true}};
 
 constexpr std::pair<const char*, double> kLengths[] = {{"millimetres", 0.001},
                                                        {"centimetres", 0.01},

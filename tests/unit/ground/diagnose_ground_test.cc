@@ -223,17 +223,20 @@ TEST(DiagnoseGround, FindsColumnsOfWheelsThatAreAnothersOrReversed) {
   }
 }
 
-// A command a second, and the robot drives on between them.
-TEST(DiagnoseGround, ATimeoutThatLoggedCommandsOutlastIsNamed) {
-  const GroundRobot robot = robot_of(kDifferential);
-  const RunLog log = driven(robot, {});
-  GroundRobot careful = robot;
-  careful.motors.command_timeout_s = 0.5;
-  const auto names = mapped(check_ground_log(careful, log), &SanityFinding::name);
-  EXPECT_EQ(names, (std::vector<std::string>{"command_timeout", "stale_commands"}));
-  const Diagnosis found = diagnosis_of(careful, log).diagnosis;
-  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
-  EXPECT_EQ(found.effects.front().name, "command_timeout");
+// A command a second, and the robot drives on between them, or stops though its file has it drive.
+TEST(DiagnoseGround, ATimeoutThatTheFileHasWrongIsNamed) {
+  GroundRobot holds = robot_of(kDifferential), stops = holds;
+  stops.motors.command_timeout_s = 0.5;
+  for (const auto& [file, robot, action] :
+       {std::tuple(&stops, &holds, "Give no cmd_vel_timeout with such a log."),
+        std::tuple(&holds, &stops, "Give the robot's file cmd_vel_timeout = 0.5.")}) {
+    const RunLog log = driven(*robot, {});
+    EXPECT_EQ(check_ground_log(*file, log).at(0).name, "command_timeout");
+    const Diagnosis found = diagnosis_of(*file, log).diagnosis;
+    ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+    EXPECT_EQ(found.effects.front().name, "command_timeout");
+    EXPECT_EQ(found.action, action);
+  }
 }
 
 TEST(DiagnoseGround, ARunThatIsTheOtherWayRoundAloneIsNamed) {
