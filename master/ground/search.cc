@@ -209,8 +209,8 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     values = search.fit.values;
     const std::vector<FitRow> rows = with_freed(search.fit.rows, hypothesis, &values);
     c.fit = fitter.fit(rows, {}, values);
-    c.may_be_named = true;
-    best = std::move(c);
+    c.may_be_named = shows_its_size(fitter, work, search, i, c.fit);
+    if (c.may_be_named) best = std::move(c);
   }
   return best;
 }
