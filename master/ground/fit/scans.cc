@@ -1,5 +1,9 @@
 #include "master/ground/fit/scans.h"
 
+#include <cmath>
+
+#include "common/base/ranges.h"
+
 namespace gapfarm {
 namespace {
 
@@ -59,6 +63,35 @@ Eigen::VectorXd scan_size(const WindowFitter& fitter, const std::vector<FitRow>&
     others.emplace_back(values)[values.size() - 1] = of.nominal + size;
   }
   return best_held(fitter, rows, values, others);
+}
+
+std::vector<Eigen::Vector2d> wheel_places(const WindowFitter& fitter, const WindowFit* far_from) {
+  const Pose X_MR = inverse(fitter.robot().X_RM);
+  const WindowSet& windows = fitter.windows();
+  const auto misses = [&](std::size_t i) {
+    const Eigen::Vector3d& scales = far_from->scales[static_cast<std::size_t>(windows.horizon[i])];
+    return far_from->residuals[i].cwiseQuotient(scales).norm();
+  };
+  std::vector<Eigen::Vector2d> places;
+  for (std::size_t i = 0; i < windows.trials.size(); ++i) {
+    if (far_from != nullptr && misses(i) < kOutlierDeviations) continue;
+    for (const RobotWheel& wheel : fitter.robot().wheels) {
+      if (!wheel.driven) continue;
+      const Pose at =
+          windows.trials[i].X_WS * X_MR * Pose{wheel.x_m.value_or(0), wheel.y_m.value_or(0), 0};
+      places.emplace_back(Eigen::Vector2d(at.x, at.y) - fitter.origin_m());
+    }
+  }
+  return places;
+}
+
+double scatter_of(const std::vector<Eigen::Vector2d>& places) {
+  const auto n = static_cast<double>(places.size());
+  Eigen::Vector2d sum(0, 0);
+  for (const Eigen::Vector2d& place : places) sum += place;
+  const double squares =
+      sum_of(places, [](const Eigen::Vector2d& place) { return place.squaredNorm(); });
+  return std::sqrt(squares / n - (sum / n).squaredNorm());
 }
 
 }  // namespace gapfarm

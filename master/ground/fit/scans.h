@@ -29,4 +29,12 @@ Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>&
 Eigen::VectorXd scan_size(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                           const Eigen::VectorXd& values);
 
+// Where wheels stand where windows begin, from the fitter's origin; `far_from`: where windows miss
+// this fit by far, alone.
+std::vector<Eigen::Vector2d> wheel_places(const WindowFitter& fitter,
+                                          const WindowFit* far_from = nullptr);
+
+// Root mean square of how far places lie from their middle.
+double scatter_of(const std::vector<Eigen::Vector2d>& places);
+
 }  // namespace gapfarm

@@ -13,6 +13,7 @@
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "master/ground/fit/held_out.h"
+#include "master/ground/fit/scans.h"
 #include "master/ground/hypotheses.h"
 #include "master/ground/tolerances.h"
 #include "master/infer/settings.h"
@@ -28,27 +29,14 @@ constexpr double kShares[] = {0.03, 0.06, 0.12, 0.22, 0.35, 0.5, 0.65, 0.78, 0.8
 // over what the places scatter by.
 constexpr double kMiddles[] = {0.08, 0.25, 0.42, 0.58, 0.75, 0.92};
 constexpr double kRadii[] = {0.35, 0.6, 1};
-constexpr double kLeastPlaces = 3 * kFolds;  // so that each fold has some to be predicted
-constexpr double kThrottleTried = 0.2;       // of the tried ratios: 5 % of the weight, a carpet
-constexpr std::size_t kClimbed = 4;          // of the groups, each from its best
+constexpr double kFarRadii[] = {0.7, 1, 1.4};  // the same round windows that miss far
+constexpr double kLeastPlaces = 3 * kFolds;    // so that each fold has some to be predicted
+constexpr double kThrottleTried = 0.2;         // of the tried ratios: 5 % of the weight, a carpet
+constexpr std::size_t kClimbed = 4;            // of the groups, each from its best
 constexpr int kClimbingRounds = 6;
 
 using Eigen::Vector2d, Eigen::VectorXd;
 using Starts = std::vector<VectorXd>;
-
-// Where wheels stand where windows begin, from the fitter's origin.
-std::vector<Vector2d> wheel_places(const WindowFitter& fitter) {
-  const Pose X_MR = inverse(fitter.robot().X_RM);
-  std::vector<Vector2d> places;
-  for (const Trial& trial : fitter.windows().trials) {
-    for (const RobotWheel& wheel : fitter.robot().wheels) {
-      if (!wheel.driven) continue;
-      const Pose at = trial.X_WS * X_MR * Pose{wheel.x_m.value_or(0), wheel.y_m.value_or(0), 0};
-      places.emplace_back(Vector2d(at.x, at.y) - fitter.origin_m());
-    }
-  }
-  return places;
-}
 
 // The places' distances along a direction, ascending.
 std::vector<double> along(const std::vector<Vector2d>& places, const Vector2d& direction) {
@@ -59,14 +47,6 @@ std::vector<double> along(const std::vector<Vector2d>& places, const Vector2d& d
 
 double at_share(const std::vector<double>& ascending, double share) {
   return ascending[static_cast<std::size_t>(share * static_cast<double>(ascending.size() - 1))];
-}
-
-double scatter_of(const std::vector<Vector2d>& places) {
-  const auto n = static_cast<double>(places.size());
-  Vector2d sum(0, 0);
-  for (const Vector2d& place : places) sum += place;
-  const double squares = sum_of(places, [](const Vector2d& place) { return place.squaredNorm(); });
-  return std::sqrt(squares / n - (sum / n).squaredNorm());
 }
 
 Vector2d direction_of(double angle) { return {std::cos(angle), std::sin(angle)}; }
@@ -221,6 +201,14 @@ VectorXd scan_circles(const WindowFitter& fitter, const WindowFit& fit,
         VectorXd& start = group.emplace_back(values);
         start.tail<4>() << at_share(xs, x), at_share(ys, y), radius * scatter, 1;
       }
+    }
+  }
+  // What is driven over rarely makes outliers, which no circle that lies a little off explains.
+  if (const auto far = wheel_places(fitter, &fit); far.size() >= kFewestReadings) {
+    const double middle[] = {at_share(along(far, {1, 0}), 0.5), at_share(along(far, {0, 1}), 0.5)};
+    for (const double times : kFarRadii) {
+      VectorXd& start = groups.emplace_back().emplace_back(values);
+      start.tail<4>() << middle[0], middle[1], times * scatter_of(far), 1;
     }
   }
   return best_region(kPatch, fitter, fit, rows, values, groups);
