@@ -139,6 +139,9 @@ inline constexpr double kPatchRatio = 1;
 inline constexpr double kAliasCosine = 0.9;
 // nats | chosen: null logs stay below 8 | Slips, and outliers of any kind.
 inline constexpr double kLeastSlipGain = 11;
+// what readings lie apart by, at most | derived: the bend is a quarter of the slope there | A lens
+// whose middle is farther away does to all readings what a sheared picture would.
+inline constexpr double kFarView = 2;
 // what the effects on the means explain | round | The same of outliers beside effects.
 inline constexpr double kLeastOutlierShare = 0.03;
 // squared s.d. | derived: chi-squared of 3 degrees, one in 110 | A trial beyond it is an outlier.

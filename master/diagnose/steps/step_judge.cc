@@ -82,6 +82,17 @@ bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value
   return at(value) <= at(row.lower) + near || at(value) >= at(row.upper) - near;
 }
 
+// Where a lens that has its middle there does no more than scale, turn and shear all readings.
+bool is_far_view(const DiagnosisRequest& of, const Parameter& row, double value) {
+  const EffectDiagnoses& effects = *of.subject.effects;
+  const WorldPlace* place = place_of(effects, row);
+  if (place == nullptr || place->axis < 0 || !effects.row(row.effect).bends_view) return false;
+  Extent box;
+  for (const Trial& trial : of.problem.log.trials) box.add(trial.X_WS);
+  const double middle = place->axis == 0 ? (box.x0 + box.x1) / 2 : (box.y0 + box.y1) / 2;
+  return std::abs(value - middle) > kFarView * box.longer_side();
+}
+
 // Of what a perfect prediction would score, nats a trial.
 double gap_left(const Refit& refit) { return refit.floor - mean(scores_with_all(refit)); }
 
@@ -311,9 +322,13 @@ std::optional<std::string> at_its_bound(const DiagnosisRequest& of, const std::s
                                         const Overrides& at) {
   for (const auto& [index, value] : at) {
     const Parameter& row = of.table()[index];
-    if (row.effect != effect || !at_bound(*of.subject.effects, row, value)) continue;
-    return effect + " explains some of it only at the edge of what it can be (" + row.key + " = " +
-           of.table().format(index, rounded_to_digits(value, 4)) + "), so it is not the cause.";
+    if (row.effect != effect) continue;
+    const bool far = is_far_view(of, row, value);
+    if (!far && !at_bound(*of.subject.effects, row, value)) continue;
+    return effect + " explains some of it only " +
+           (far ? "from far beyond all readings" : "at the edge of what it can be") + " (" +
+           row.key + " = " + of.table().format(index, rounded_to_digits(value, 4)) +
+           "), so it is not the cause.";
   }
   return std::nullopt;
 }

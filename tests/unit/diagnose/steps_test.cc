@@ -377,6 +377,10 @@ TEST(Steps, OnlyWhatCouldGrowIsQuestionedOnItsBound) {
   EXPECT_TRUE(dropped_at("friction_patch", "radius", 5));
   EXPECT_TRUE(dropped_at("com_offset", "x", 0.03));
   EXPECT_FALSE(dropped_at("com_offset", "x", 0.02));
+  // A picture that is sheared passes for one through a lens whose middle is metres away.
+  EXPECT_FALSE(dropped_at("camera_distortion", "x", 1.5));
+  EXPECT_TRUE(dropped_at("camera_distortion", "x", 8.5));
+  EXPECT_TRUE(dropped_at("camera_distortion", "y", -8));
 }
 
 }  // namespace
