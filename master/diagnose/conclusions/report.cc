@@ -28,8 +28,12 @@ void fill_gap(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   const RootMeanSquare tuned = held_out_error(base, folds);
   const RootMeanSquare last = held_out_error(model, folds);
   const RootMeanSquare noise = error_of_noise(model.study);
-  d->position_mm = {tuned.position_mm, last.position_mm, noise.position_mm};
-  d->heading_mrad = {tuned.heading_mrad, last.heading_mrad, noise.heading_mrad};
+  // The noise's tails scatter by luck: no floor is higher than what was reached.
+  const auto figures = [&](double RootMeanSquare::*part) {
+    return GapFigures{tuned.*part, last.*part, std::min({tuned.*part, last.*part, noise.*part})};
+  };
+  d->position_mm = figures(&RootMeanSquare::position_mm);
+  d->heading_mrad = figures(&RootMeanSquare::heading_mrad);
 }
 
 void fill_where(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {

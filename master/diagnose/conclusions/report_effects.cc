@@ -197,7 +197,7 @@ ClosedShare closed_share(const DiagnosisRequest& of, const Refit& refit,
         gap += refit.floor - base[i];
       }
     }
-    return gap > 0 ? std::clamp(gain / gap, -1.0, 1.5) : 0.0;
+    return gap > 0 ? std::clamp(gain / gap, -1.0, 1.0) : 0.0;
   };
   std::vector<std::size_t> all = indices(chains.size());
   const double whole = share(all);
@@ -207,7 +207,8 @@ ClosedShare closed_share(const DiagnosisRequest& of, const Refit& refit,
     for (std::size_t& c : all) c = stream.below(chains.size());
     shares.push_back(share(all));
   }
-  return {whole, quantile(shares, 0.05), quantile(shares, 0.95)};
+  // Of draws without a gap nothing is closed, though of all there is one.
+  return {whole, std::min(whole, quantile(shares, 0.05)), std::max(whole, quantile(shares, 0.95))};
 }
 
 std::vector<NamedEffect> named_effects(const DiagnosisRequest& of, const Refit& refit) {
