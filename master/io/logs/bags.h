@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,8 +25,8 @@ struct LogTable {
   // Of each column: its long name, and the unit that the file states.  Empty: no row has them.
   std::vector<std::string> titles = {};
   std::vector<CsvField> units = {};
-  // Cells of columns that hold more than numbers, by column; of the others there are none.
-  std::map<std::size_t, std::vector<std::string>> texts = {};
+  // As `values`, but the cells as they stand; empty where the file has numbers alone.
+  std::vector<std::string> texts = {};
   // Of a bag's poses: the frame that they are in, and of transforms the one that they place.
   std::string frame = {}, child = {};
 

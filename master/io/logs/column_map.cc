@@ -77,6 +77,10 @@ constexpr ColumnNumber kNumbers[] = {{"scale", &MappedColumn::scale, 0, 1e12},
                                      {"gear", &MappedColumn::gear, 1e-6, 1e6},
                                      {"wraps", &MappedColumn::wraps, 0, 1e12}};
 
+// What else a row may say, by a column.
+constexpr std::pair<const char*, std::string TableMap::*> kRowColumns[] = {
+    {"session", &TableMap::session}, {"run", &TableMap::run}, {"keep", &TableMap::keep}};
+
 // Bags may hold any bytes: what is not UTF-8, which TOML has to be, becomes '_'.
 std::string quoted(const std::string& text) {
   std::string word = toml_string(text);
@@ -90,8 +94,9 @@ void write_table(const char* name, const TableMap& table, std::string& out) {
   if (table.columns.empty()) return;
   out += std::string(out.empty() ? "" : "\n") + "[" + name + "]\n";
   if (!table.source.empty()) out += "source = " + quoted(table.source) + "\n";
-  if (!table.run.empty()) out += "run = " + quoted(table.run) + "\n";
-  if (!table.keep.empty()) out += "keep = " + quoted(table.keep) + "\n";
+  for (const auto& [key, column] : kRowColumns) {
+    if (!(table.*column).empty()) out += std::string(key) + " = " + quoted(table.*column) + "\n";
+  }
   if (table.up != "z") out += "up = " + quoted(table.up) + "\n";
   if (table.wheel_radius_m > 0) {
     out += "wheel_radius = " + format_double(table.wheel_radius_m) + "\n";
@@ -124,8 +129,7 @@ class MapReader {
     auto section = root.section(name);
     if (!section) return;
     section->read("source", map.source);
-    section->read("run", map.run);
-    section->read("keep", map.keep);
+    for (const auto& [key, column] : kRowColumns) section->read(key, map.*column);
     static const std::vector<std::string> kUp = {"z", "y"};
     if (const auto up = section->choice("up", kUp)) map.up = kUp[*up];
     section->read("wheel_radius", map.wheel_radius_m, 1e-4, 100, "m");
@@ -133,7 +137,7 @@ class MapReader {
     std::string covariance;
     section->read("covariance", covariance);
     static const std::set<std::string_view> kOptions = {
-        "source", "run", "keep", "up", "wheel_radius", "increments", "covariance"};
+        "source", "session", "run", "keep", "up", "wheel_radius", "increments", "covariance"};
     for (const auto& [key, node] : section->table()) {
       const std::string role(key.str());
       if (kOptions.count(role) != 0) continue;

@@ -29,7 +29,8 @@ struct MappedColumn {
 // Where one kind of rows comes from.
 struct TableMap {
   std::string source;    // topic, or the end of a file's name; empty: the one table that has all
-  std::string run;       // column that numbers or names the runs; empty: a file is one
+  std::string session;   // column that names the sessions; empty: all runs are of one
+  std::string run;       // column that names the runs of each; empty: a file is one
   std::string keep;      // column that is not zero where a row counts; empty: all rows count
   std::string up = "z";  // poses: the world's upward axis; Motive's is y
   double wheel_radius_m = 0;  // turns rims' m/s into rad/s; 0: not stated

@@ -128,6 +128,7 @@ class Guess {
   void start(const LogTable& table, const std::string& time, TableMap& to) {
     to = {};
     to.source = table.topic;
+    to.session = column_of(table, {"session"});
     to.run = column_of(table, kRun);
     if (time.empty()) {
       to.intervals = true;
@@ -236,7 +237,7 @@ class Guess {
     for (const char c : joint) {
       role += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
     }
-    for (const char* own : {"", "source", "run", "keep", "up", "wheel_radius"}) {
+    for (const char* own : {"", "source", "session", "run", "keep", "up", "wheel_radius"}) {
       if (role == own) role += "_joint";
     }
     while (taken.find(role) != nullptr) role += "_2";

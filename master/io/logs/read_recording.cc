@@ -82,15 +82,25 @@ std::string digits(double value, int decimals) {
   return out == "-0" ? "0" : out;
 }
 
+bool has_sessions(const RunLog& log) {
+  return std::ranges::any_of(log.runs, [](const LoggedRun& run) { return !run.session.empty(); });
+}
+
+// "session,run," of a row, as the head has it.
+std::string key_of(const RunLog& log, const LoggedRun& run) {
+  return (has_sessions(log) ? csv_field(run.session) + "," : "") + csv_field(run.run) + ",";
+}
+
 std::string format_commands(const std::vector<std::string>& channels, const RunLog& log,
                             std::vector<CommandRow> LoggedRun::*rows) {
-  std::string out = "run,t";
+  std::string out = has_sessions(log) ? "session,run,t" : "run,t";
   for (const std::string& channel : channels) out += "," + csv_field(channel);
   out += "\n";
   bool any = false;
   for (const LoggedRun& run : log.runs) {
+    const std::string key = key_of(log, run);
     for (const CommandRow& row : run.*rows) {
-      out += csv_field(run.run) + "," + digits(row.t_s, 6);
+      out += key + digits(row.t_s, 6);
       for (const double value : row.values) out += "," + digits(value, 9);
       out += "\n";
       any = true;
@@ -149,17 +159,19 @@ RunFiles format_runs(const RunLog& log) {
   files.gyro = format_commands({"yaw_rate"}, log, &LoggedRun::yaw_rates);
   const bool noisy = std::ranges::any_of(
       log.runs, [](const LoggedRun& run) { return !run.poses.empty() && run.poses.back().noise; });
-  files.poses = log.relative ? "run,t,dx,dy,dtheta" : "run,t,x,y,theta";
+  files.poses = has_sessions(log) ? "session," : "";
+  files.poses += log.relative ? "run,t,dx,dy,dtheta" : "run,t,x,y,theta";
   for (const std::string& name : kCovarianceColumns) files.poses += noisy ? "," + name : "";
   files.poses += "\n";
   // Increments add up, and so does what is rounded off.
   const int places = log.relative ? 9 : 6;
   for (const LoggedRun& run : log.runs) {
+    const std::string key = key_of(log, run);
     Pose before = run.poses.empty() ? Pose() : run.poses.front().X_WM;
     for (const PoseRow& row : run.poses) {
       const Pose X = log.relative ? inverse(before) * row.X_WM : row.X_WM;
-      files.poses += csv_field(run.run) + "," + digits(row.t_s, 6) + "," + digits(X.x, places) +
-                     "," + digits(X.y, places) + "," + digits(X.theta, places + 1);
+      files.poses += key + digits(row.t_s, 6) + "," + digits(X.x, places) + "," +
+                     digits(X.y, places) + "," + digits(X.theta, places + 1);
       const Eigen::Matrix3d noise = row.noise.value_or(Eigen::Matrix3d::Zero());
       for (Eigen::Index r = 0; r < 3 && noisy; ++r) {
         // Covariances have no digits that count from the point.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -19,7 +20,8 @@ struct Stretch {
   std::vector<std::vector<double>> rows;
   bool behind = false;  // the time of the row before this one goes back
 };
-using Stretches = std::map<std::string, Stretch>;  // by run
+using RunKey = std::pair<std::string, std::string>;  // a session and a run in it
+using Stretches = std::map<RunKey, Stretch>;
 
 struct RowTally {
   std::size_t taken = 0, blank = 0, back = 0, dropped = 0;

@@ -314,11 +314,8 @@ Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file
                       "check that the log was written");
   }
   blank_slips(words, file, &table, mistakes);
-  for (const Word& word : words) {
-    std::vector<std::string>& column = table.texts[word.column];
-    for (std::size_t r = column.size() + head.rows; r < rows.size(); ++r) {
-      column.push_back(rows[r].fields[word.column].text);
-    }
+  for (std::size_t r = head.rows; r < rows.size(); ++r) {
+    for (CsvField& field : rows[r].fields) table.texts.push_back(std::move(field.text));
   }
   join_times(&table);
   const std::string& first = table.columns.front();

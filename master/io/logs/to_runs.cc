@@ -91,8 +91,9 @@ class Importer {
             "it counts to) for it in the map");
       }
     }
-    std::optional<std::size_t> run, keep;
-    for (const auto& [name, to] : {std::pair{&map.run, &run}, {&map.keep, &keep}}) {
+    std::optional<std::size_t> session, run, keep;
+    for (const auto& [name, to] :
+         {std::pair{&map.session, &session}, {&map.run, &run}, {&map.keep, &keep}}) {
       if (name->empty()) continue;
       *to = table.find(*name);
       if (!*to) {
@@ -101,7 +102,7 @@ class Importer {
       }
     }
     std::vector<double> counts(at.size(), NAN);
-    std::map<std::string, std::vector<double>> before;  // of each run: its last row
+    std::map<RunKey, std::vector<double>> before;  // of each run: its last row
     RowTally& tally = tallies_[kind.name];
     const std::set<std::size_t> broken = broken_rows(table);
     std::size_t part = 0;
@@ -128,8 +129,8 @@ class Importer {
         ++tally.blank;
         continue;
       }
-      const std::string name = run_name(table, run, r, part);
-      const bool leads_on = poses && (map.intervals || before.count(name) != 0);
+      const RunKey key{cell(table, session, r), part_of(cell(table, run, r), part)};
+      const bool leads_on = poses && (map.intervals || before.count(key) != 0);
       if (leads_on && map.increments && std::abs(values[3]) > std::numbers::pi) {
         return Error{table.source + ": found a turn of " + format_double(values[3]) +
                      " rad in row " + std::to_string(r + 1) +
@@ -143,9 +144,9 @@ class Importer {
                        fault->remedy};
         }
       }
-      if (!at_its_time(map, poses, before[name], values)) continue;
+      if (!at_its_time(map, poses, before[key], values)) continue;
       Stretches& stretches = stretches_[kind.name][recording];
-      const auto [stretch, begun] = stretches.try_emplace(name);
+      const auto [stretch, begun] = stretches.try_emplace(key);
       if (begun) stretch->second.place = stretches.size();
       put_row(tally, stretch->second, values, table.source, r);
     }
@@ -177,14 +178,17 @@ class Importer {
     return broken;
   }
 
-  static std::string run_name(const LogTable& table, const std::optional<std::size_t>& run,
-                              std::size_t row, std::size_t part) {
-    std::string name;
-    if (run && table.texts.contains(*run)) {
-      name = table.texts.at(*run)[row];
-    } else if (run && std::isfinite(table.at(row, *run))) {
-      name = format_double(table.at(row, *run));
-    }
+  // A name as it stands: 007 is not 7.
+  static std::string cell(const LogTable& table, const std::optional<std::size_t>& column,
+                          std::size_t row) {
+    if (!column) return "";
+    const std::size_t width = table.texts.size() / table.rows();
+    if (*column < width) return table.texts[row * width + *column];
+    const double number = table.at(row, *column);
+    return std::isfinite(number) ? format_double(number) : "";
+  }
+
+  static std::string part_of(const std::string& name, std::size_t part) {
     if (part == 0) return name;
     return (name.empty() ? "part" : name) + "_" + std::to_string(part);
   }
@@ -224,8 +228,8 @@ class Importer {
     }
     const auto all = groups();
     for (const auto& group : all) {
-      std::map<std::string, LoggedRun> runs;
-      std::vector<std::string> order;
+      std::map<RunKey, LoggedRun> runs;
+      std::vector<RunKey> order;
       for (const RowKind& kind : kRowKinds) {
         for (const std::size_t i : group) {
           const auto found = stretches_[kind.name].find(i);
@@ -238,19 +242,26 @@ class Importer {
           }
         }
       }
-      // By their numbers, else by time, and as they appear where each begins at 0.
-      const bool numbered = std::ranges::all_of(
-          order, [](const std::string& name) { return parse_double(name).has_value(); });
-      std::ranges::stable_sort(order, {}, [&](const std::string& name) {
-        return numbered ? *parse_double(name) : first_time(runs[name]);
+      // Within a session by their numbers, else by time, and as they appear where each begins at 0.
+      const bool numbered = std::ranges::all_of(order, [](const RunKey& key) {
+        return std::isfinite(parse_double(key.second).value_or(NAN));
       });
-      for (const std::string& name : order) {
-        LoggedRun& run = runs[name];
+      const std::vector<RunKey> appearing = order;
+      std::ranges::stable_sort(order, {}, [&](const RunKey& key) {
+        return std::pair(std::ranges::find(appearing, key.first, &RunKey::first),
+                         numbered ? *parse_double(key.second) : first_time(runs[key]));
+      });
+      for (const RunKey& key : order) {
+        const auto& [session, name] = key;
+        LoggedRun& run = runs[key];
         const std::string stem = stem_of(recordings_[group.front()].file);
+        run.session = session;
         run.run = name.empty() ? stem : all.size() == 1 ? name : stem + "_" + name;
-        for (char& c : run.run) c = c == ',' || static_cast<unsigned char>(c) < 0x20 ? '_' : c;
+        for (std::string* text : {&run.session, &run.run}) {
+          for (char& c : *text) c = c == ',' || static_cast<unsigned char>(c) < 0x20 ? '_' : c;
+        }
         if (run.poses.size() < 2 || (run.commands.empty() && !log.channels.empty())) {
-          out_.report.push_back("left: run " + run.run + ", which has " +
+          out_.report.push_back("left: run " + run_name(run.session, run.run) + ", which has " +
                                 (run.poses.empty()      ? "no poses"
                                  : run.poses.size() < 2 ? "one pose"
                                                         : "no commands"));
@@ -268,9 +279,9 @@ class Importer {
     return first;
   }
 
-  void add(const RowKind& kind, const Stretch& stretch, LoggedRun& run,
-           std::vector<std::string>& order, const std::string& name) const {
-    if (!contains(order, name)) order.push_back(name);
+  void add(const RowKind& kind, const Stretch& stretch, LoggedRun& run, std::vector<RunKey>& order,
+           const RunKey& key) const {
+    if (!contains(order, key)) order.push_back(key);
     const bool increments = kind.rows == nullptr && map_.poses.increments;
     if (increments && map_.poses.intervals) run.poses.push_back({0, {}});
     for (std::size_t i = 0; i < stretch.t_s.size(); ++i) {

@@ -330,4 +330,55 @@ TEST(Tables, SecondsAndNanosecondsAreOneTime) {
   }
 }
 
+// Two poses and two commands for each of these beginnings of rows.
+std::string drives(const std::string& head, const std::vector<std::string>& begins) {
+  std::string text = head + ",t,x,y,theta,v,omega\n";
+  for (const std::string& begin : begins) {
+    text += begin + ",0,0,0,0,0.3,0\n" + begin + ",0.1,0.03,0,0,0.3,0\n";
+  }
+  return text;
+}
+
+Result<ImportedRuns> to_runs_by_guess(const std::string& text) {
+  const Recording one = table_of(text);
+  return to_runs({one}, guess_map({one}));
+}
+
+TEST(RunNames, AreTextAndNoNumbers) {
+  const std::vector<std::string> names = {"7",    "007",  "1.1",
+                                          "1.10", "1e3",  "1000",
+                                          "inf",  "true", "20260301093000123",
+                                          "nan",  "1",    "20260301093000124"};
+  const auto runs = to_runs_by_guess(drives("run", names));
+  ASSERT_TRUE(runs) << runs.error().message;
+  std::vector<std::string> found;
+  for (const LoggedRun& run : runs->log.runs) found.push_back(run.run);
+  EXPECT_EQ(found, names);
+  const auto ordered = to_runs_by_guess(drives("run", {"010", "9"}));
+  ASSERT_TRUE(ordered);
+  EXPECT_EQ(ordered->log.runs.at(0).run, "9");
+}
+
+TEST(RunNames, AreOfTheirSessions) {
+  const auto runs = to_runs_by_guess(drives("session,run", {"b,2", "b,1", "a,1", "a,2"}));
+  ASSERT_TRUE(runs) << runs.error().message;
+  const RunFiles files = format_runs(runs->log);
+  EXPECT_THAT(files.poses, StartsWith("session,run,t,x,y,theta\nb,1,0,"));
+  const std::string folder = testing::TempDir() + "/import_sessions";
+  ASSERT_TRUE(write_file_atomically(folder + "/commands.csv", files.commands));
+  ASSERT_TRUE(write_file_atomically(folder + "/poses.csv", files.poses));
+  const auto log = read_runs(folder + "/commands.csv", folder + "/poses.csv", runs->log.channels);
+  ASSERT_TRUE(log) << log.error().message;
+  std::vector<std::string> found;
+  for (const LoggedRun& run : log->runs) found.push_back(run_name(run.session, run.run));
+  EXPECT_THAT(found, ElementsAre("b/1", "b/2", "a/1", "a/2"));
+
+  const auto map = parse_map(
+      "[poses]\nsession = \"day\"\nt = { column = \"t\" }\nx = { column = \"x\" }\n"
+      "y = { column = \"y\" }\ntheta = { column = \"theta\" }\n",
+      "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_THAT(format_map(*map), HasSubstr("session = \"day\"\n"));
+}
+
 }  // namespace gapfarm::tables_test
