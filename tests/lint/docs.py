@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Docs that hold: links and anchors exist, paths of the architecture exist, commands are commands, each page begins
+"""Docs that hold: links and anchors exist, paths of sources exist, commands are commands, each page begins
 with its purpose and a command, README is short, the table of
 settings is what its script prints.  Usage: docs.py ROOT"""
 import os
@@ -64,10 +64,9 @@ def check_page(root, page, commands):
     if page.startswith('docs/') and not page.startswith('docs/evidence/'):
         if not re.search(r'^(    \S|```)', '\n'.join(text.split('\n')[:FIRST_LINES]), re.M):
             wrong.append(f'{page}: no command in its first {FIRST_LINES} lines; say what the page is for, then show one')
-    if page == 'docs/architecture.md':
-        for path in set(re.findall(r'`((?:common|master|worker|proto|tests)/[\w/.]+)`', text)):
-            if not os.path.exists(os.path.join(root, path)):
-                wrong.append(f'{page}: names {path}, which is not there')
+    for path in set(re.findall(r'`((?:common|master|worker|proto|scripts|tests)/[\w/.@-]+)', text)):
+        if not os.path.exists(os.path.join(root, path)):
+            wrong.append(f'{page}: names {path}, which is not there')
     return wrong
 
 
