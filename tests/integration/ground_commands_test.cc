@@ -112,6 +112,23 @@ TEST_F(GroundCommands, WatchCountsTheRunsThatItFitted) {
   EXPECT_THAT(watched.out, HasSubstr(" 1 runs, 1 of them fitted now")) << watched.err;
 }
 
+TEST_F(GroundCommands, WatchSaysSinceWhenEveryRunIsRejected) {
+  write_runs("fleet/run1", {2}, 10);
+  for (const int run : {2, 3, 4}) write_runs("fleet/run" + std::to_string(run), {0.2 + 0.01 * run});
+  folder_.write("fleet/run3/poses.csv", "run,x,y,theta\n1,0,0,0\n");
+  folder_.write("fleet/robot.toml", text_of(robot_));
+  const std::string out = folder_ / "watched";
+  const Finished watched = gapfarm_command({"watch", folder_ / "fleet", "--out", out});
+  EXPECT_EQ(watched.exit_code, 4) << watched.err;
+  EXPECT_THAT(watched.out, HasSubstr("Something changed. Since fleet/run2 every run of fleet is "
+                                     "omitted; that one: "));
+  EXPECT_THAT(watched.out, HasSubstr("The first run to look at: fleet/run2.\n"));
+  const json found = json::parse(text_of(out + "/watch.json"));
+  EXPECT_EQ(found["changed"], true);
+  EXPECT_EQ(found["stops"].size(), 1U);
+  EXPECT_EQ(found["stops"][0]["run"], "run2");
+}
+
 TEST_F(GroundCommands, ARobotsFileDoesNotPassSuppositionsForFacts) {
   const std::string out = folder_ / "whole.toml";
   const Finished described = gapfarm_command({"robot", robot_, "--out", out});

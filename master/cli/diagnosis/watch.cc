@@ -39,7 +39,9 @@ struct WatchCommand {
 struct RunFolder {
   fs::path path;
   std::string name;
-  RunLog log;
+  RunLog log = {};
+  std::string fault = {};  // why it cannot be read
+  double begin_s = 0;      // of one that cannot be read, that of the one before by name
 };
 
 struct RobotFolder {
@@ -52,8 +54,6 @@ struct RobotFolder {
 bool is_run(const fs::path& folder) {
   return is_there(folder / "commands.csv") || is_there(folder / "poses.csv");
 }
-
-double begin_of(const RunFolder& run) { return run.log.runs.front().poses.front().t_s; }
 
 std::vector<std::string> folders_in(const fs::path& folder) {
   std::vector<std::string> names;
@@ -74,12 +74,12 @@ std::vector<RobotFolder> find_robots(const fs::path& folder) {
                   {}};
   for (const std::string& name : folders_in(folder)) {
     if (is_run(folder / name)) {
-      own.runs.push_back({folder / name, name, {}});
+      own.runs.push_back({folder / name, name});
       continue;
     }
     RobotFolder robot{name, folder / name, {}, {}};
     for (const std::string& run : folders_in(folder / name)) {
-      if (is_run(folder / name / run)) robot.runs.push_back({folder / name / run, run, {}});
+      if (is_run(folder / name / run)) robot.runs.push_back({folder / name / run, run});
     }
     if (!robot.runs.empty()) robots.push_back(std::move(robot));
   }
@@ -130,26 +130,25 @@ void keep_one_kind(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
 
 void read_logs(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
   for (RobotFolder& robot : *robots) {
-    std::erase_if(robot.runs, [&](RunFolder& run) {
+    bool dated = true;
+    double begin_s = 0;
+    for (RunFolder& run : robot.runs) {
       const std::vector<std::string> folder = {run.path.string()};
       auto log = read_run_folders(folder, robot.robot.channels);
-      if (!log) {
-        fleet->skipped.push_back({robot.name, run.name, log.error().message});
-        return true;
+      if (log) {
+        for (const std::string& note : log->notes) {
+          fleet->notes.push_back(robot.name + "/" + run.name + ": " + note);
+        }
+        run.log = std::move(*log);
+        begin_s = run.log.runs.front().poses.front().t_s;
+        dated = dated && begin_s > kEpoch_s;
+      } else {
+        run.fault = log.error().message;
       }
-      for (const std::string& note : log->notes) {
-        fleet->notes.push_back(robot.name + "/" + run.name + ": " + note);
-      }
-      run.log = std::move(*log);
-      return false;
-    });
-    const bool dated = std::ranges::all_of(
-        robot.runs, [](const RunFolder& run) { return begin_of(run) > kEpoch_s; });
-    if (dated) {  // runs at one time stay by name
-      std::ranges::stable_sort(robot.runs, [](const RunFolder& a, const RunFolder& b) {
-        return begin_of(a) < begin_of(b);
-      });
+      run.begin_s = begin_s;
     }
+    // Runs at one time stay by name.
+    if (dated) std::ranges::stable_sort(robot.runs, {}, &RunFolder::begin_s);
   }
 }
 
@@ -158,17 +157,25 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
                 WatchedFleet* fleet) {
   RunCache cache(cache_file);
   const bool by_wheels = std::ranges::all_of(*robots, [](const RobotFolder& robot) {
-    return std::ranges::all_of(
-        robot.runs, [&](const RunFolder& run) { return has_wheel_speeds(robot.robot, run.log); });
+    return std::ranges::all_of(robot.runs, [&](const RunFolder& run) {
+      return !run.fault.empty() || has_wheel_speeds(robot.robot, run.log);
+    });
   });
   std::size_t all = 0, done = 0;
   std::map<std::string, std::string> seen;  // logs, and whose they are
   for (const RobotFolder& robot : *robots) all += robot.runs.size();
   for (RobotFolder& robot : *robots) {
-    WatchedRobot& to = fleet->robots.emplace_back(WatchedRobot{robot.name, {}, {}, {}});
+    WatchedRobot& to = fleet->robots.emplace_back(WatchedRobot{robot.name});
+    const auto reject = [&](const RunFolder& run, const std::string& why) {
+      to.rejected.push_back({robot.name, run.name, why});
+      fleet->skipped.push_back(to.rejected.back());
+    };
     for (RunFolder& run : robot.runs) {
       ++done;
-      const double begin_s = begin_of(run);
+      if (!run.fault.empty()) {
+        reject(run, run.fault);
+        continue;
+      }
       if (context.stop.requested()) return Error{"stopped", ErrorCode::kStopped};
       const auto [first, fresh] = seen.try_emplace(log_hash(run.log), robot.name + "/" + run.name);
       if (!fresh) {  // copied, or linked
@@ -188,13 +195,14 @@ Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, Cl
         cache.keep(key, *fit);
       }
       if (!*fit) {
-        fleet->skipped.push_back({robot.name, run.name, fit->error().message});
+        reject(run, fit->error().message);
         continue;
       }
       fleet->fitted += now ? 1 : 0;
       to.runs.push_back(run.name);
       to.fits.push_back(**fit);
-      to.times_s.push_back(begin_s);
+      to.times_s.push_back(run.begin_s);
+      to.rejected.clear();
     }
   }
   context.console.clear_progress();
@@ -253,7 +261,7 @@ Result<int> run_watch(WatchCommand& command, CliContext& context) {
   for (const std::string& note : fleet.notes) context.console.note(note);
   context.console.result(watch_text(fleet, changes), json);
   context.console.note("wrote: " + command.out + "/watch.json, report.html");
-  return changes.steps.empty() && changes.odd_robots.empty() ? kExitDone : kExitChanged;
+  return something_changed(fleet, changes) ? kExitChanged : kExitDone;
 }
 
 }  // namespace

@@ -66,16 +66,27 @@ std::string odd_run_text(const WatchedFleet& fleet, const OddRun& odd) {
          (last ? "; it is the last one, so the next one shows whether this stays" : "");
 }
 
+// Of robots whose runs are all rejected by now, the first that is.
+std::vector<WatchedSkip> stops_of(const WatchedFleet& fleet) {
+  return mapped(
+      filtered(fleet.robots,
+               [](const WatchedRobot& robot) { return robot.rejected.size() >= kFewestAlike; }),
+      [](const WatchedRobot& robot) { return robot.rejected.front(); });
+}
+
 std::string verdict(const WatchedFleet& fleet, const FleetChanges& changes) {
   const std::string first = first_to_look_at(fleet, changes);
-  const bool changed = !changes.steps.empty() || !changes.odd_robots.empty();
   const bool shown = std::ranges::any_of(
       fleet.robots, [](const auto& robot) { return robot.runs.size() >= 2 * kFewestAlike; });
-  return std::string(changed ? "Something changed."
-                     : shown ? "Nothing changed that these runs show."
+  const std::string stops = joined(stops_of(fleet), "", [](const WatchedSkip& stop) {
+    return " Since " + stop.robot + "/" + stop.run + " every run of " + stop.robot +
+           " is omitted; that one: " + stop.why + (stop.why.ends_with('.') ? "" : ".");
+  });
+  return std::string(something_changed(fleet, changes) ? "Something changed."
+                     : shown                           ? "Nothing changed that these runs show."
                              : "Too few runs: a change has three of them before it and three "
                                "behind it.") +
-         (first.empty() ? "" : " The first run to look at: " + first + ".");
+         stops + (first.empty() ? "" : " The first run to look at: " + first + ".");
 }
 
 // Where a step of a robot begins and a reading by run, with what was fitted.
@@ -103,6 +114,7 @@ LineChart value_chart(const WatchedFleet& fleet, const FleetChanges& changes, st
   return chart;
 }
 
+constexpr auto kSkip = [](auto& v, auto& row) { FIELDS(robot, run, why); };
 constexpr auto kChange = [](auto& v, auto& row) { FIELDS(change, lo, hi, statistic); };
 
 Json value_json(const WatchedFleet& fleet, std::size_t robot, std::size_t value) {
@@ -179,7 +191,13 @@ std::string skip_text(const WatchedSkip& skip) {
   return skip.robot + (skip.run.empty() ? "" : "/" + skip.run) + ": omitted: " + skip.why;
 }
 
+bool something_changed(const WatchedFleet& fleet, const FleetChanges& changes) {
+  return !changes.steps.empty() || !changes.odd_robots.empty() || !stops_of(fleet).empty();
+}
+
 std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& changes) {
+  const std::vector<WatchedSkip> stops = stops_of(fleet);
+  if (!stops.empty()) return stops.front().robot + "/" + stops.front().run;
   const auto most = std::ranges::max_element(changes.steps, {}, &ValueStep::statistic);
   if (most != changes.steps.end()) return run_name(fleet, most->robots.front(), most->onset);
   if (!changes.odd_robots.empty()) return run_name(fleet, changes.odd_robots.front().robot, 0);
@@ -225,13 +243,13 @@ Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
     thresholds[fleet.rows.values[k].value] = changes.thresholds.steps[k];
   }
   return {{"version", 1},
-          {"changed", !changes.steps.empty() || !odd_robots.empty()},
+          {"changed", something_changed(fleet, changes)},
           {"first_run", first_to_look_at(fleet, changes)},
           {"steps", steps_json(fleet, changes)},
           {"odd_robots", odd_robots},
           {"odd_runs", odd_runs},
-          {"skipped",
-           FieldWriter::list(fleet.skipped, [](auto& v, auto& row) { FIELDS(robot, run, why); })},
+          {"stops", FieldWriter::list(stops_of(fleet), kSkip)},
+          {"skipped", FieldWriter::list(fleet.skipped, kSkip)},
           {"false_alarms", changes.thresholds.false_alarms},
           {"thresholds", thresholds},
           {"shared", shared_json(fleet, changes)},
