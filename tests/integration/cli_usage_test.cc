@@ -70,6 +70,20 @@ TEST(CliUsage, InitWritesAConfigThatChecksAndReportsWhatItGuessed) {
   EXPECT_EQ(gapfarm_command({"init", log, "--out", out}).exit_code, 2) << "it is there already";
 }
 
+TEST(CliUsage, InitOfMillimetresAsksForMetres) {
+  const TemporaryFolder folder;
+  std::string log = "session,trial,t,command,left,right,duration,x0,y0,theta0,x1,y1,theta1\n";
+  for (int i = 0; i < 12; ++i) {
+    log += "s," + std::to_string(i) + ",,forward,1,1,1,0," + std::to_string(40 * i) + ",0," +
+           std::to_string(280 + i) + "," + std::to_string(40 * i) + ",0\n";
+  }
+  const Finished shown = gapfarm_command({"init", folder.write("mm.csv", log)});
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_THAT(shown.out, HasSubstr("# QUESTION: Drives cover 28"));
+  EXPECT_THAT(shown.out, HasSubstr(" Multiply x0, y0, x1 and y1 by 0.001.\n"));
+  EXPECT_THAT(shown.out, Not(HasSubstr("what robot is this")));
+}
+
 TEST(CliUsage, ADryRunRunsNothingAndReportsSo) {
   const TemporaryFolder folder;
   const Finished dry = gapfarm_command({"evolve", GAPFARM_SOURCE_DIR "/configs/demo.toml", "--out",

@@ -8,9 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
+#include "common/config/config.h"
 #include "common/math/statistics.h"
 #include "common/score/motion_model.h"
 #include "master/cli/data/robot_setup.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
 namespace {
@@ -26,6 +28,7 @@ struct LogFigures {
   std::vector<CommandSpec> commands;  // of the log, each as it was mostly given
   std::map<std::string, std::size_t> counts;
   std::optional<double> speed_m_s;  // at full duty, of straight drives
+  std::string unit_question;        // of lengths that are in no metres
 };
 
 bool drives_straight(const CommandSpec& c) { return c.left == c.right && c.left != 0; }
@@ -62,7 +65,7 @@ bool is_another_robot(const LogFigures& figures) {
 
 // What is to be measured: of an SRV-1 here, of another robot in a file of its own.
 std::string robot_text(const LogFigures& figures) {
-  if (is_another_robot(figures)) {
+  if (figures.unit_question.empty() && is_another_robot(figures)) {
     return fmt::format(
         "# QUESTION: what robot is this?  None of the SRV-1's size makes {:.3g} m/s.  Copy\n"
         "# configs/robots/srv1.toml, measure, and name the copy here (docs/formats.md):\n"
@@ -127,8 +130,8 @@ std::string config_of_log(const LogFigures& figures, const TrialLog& log,
          "scenario = \"srv1\"     # a robot on two sides that stands still before and after a "
          "command\n"
          "seed = 1\ntrials = [" +
-         files + "]\n\n" + robot_text(figures) + "\n# What evolution searches.\n[genes]\n" +
-         speed_gene(figures) +
+         files + "]\n" + figures.unit_question + "\n" + robot_text(figures) +
+         "\n# What evolution searches.\n[genes]\n" + speed_gene(figures) +
          "# QUESTION: how long is the contact with the floor?  Half to twice that serves.\n"
          "contact_length = \"table\"         # m\n"
          "friction = [0.1, 1.5]\n"
@@ -153,7 +156,13 @@ Result<int> run_init(InitOptions& options, CliContext& context) {
   options.outputs.reads(log);
   RETURN_IF_ERROR(options.outputs.plan(options.out));
   context.begun = true;
-  const LogFigures figures = figures_of(log, known);
+  LogFigures figures = figures_of(log, known);
+  ASSIGN_OR_RETURN(Config config, parse_config("", options.out));
+  config.problem.log = log;
+  for (const SanityFinding& finding : check_sanity(config.problem)) {
+    if (finding.name != "unit_error") continue;
+    figures.unit_question += "# QUESTION: " + finding.text + " " + finding.remedy + "\n";
+  }
   const std::string text = config_of_log(figures, log, known, options);
   Json json = {{"out", options.out}, {"trials", log.trials.size()}};
   if (figures.speed_m_s) json["full_speed"] = *figures.speed_m_s;
