@@ -55,7 +55,7 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
   const std::filesystem::path out(command.out);
   RETURN_IF_ERROR(
       command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem)));
-  Model model = model_of_problem(config.problem, report.best.values);
+  Model model = model_of_problem(config.problem, report.best);
   model.kind = "stable";
   RETURN_IF_ERROR(command.outputs.write_model((out / "model.toml").string(), model));
   const ParameterTable& table = config.problem.table();
@@ -64,20 +64,25 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
       "  the config's own values  {}, on fresh repeats {}\n"
       "  the most stable found    {}, on fresh repeats {}\n",
       command.settings.repeats, report.evaluations, spread_text(report.standard_spread),
-      spread_text(report.standard_fresh), spread_text(report.best.spread),
+      spread_text(report.standard_fresh), spread_text(report.best_spread),
       spread_text(report.best_fresh));
+  if (!report.beats_standard) {
+    text +=
+        "No point does better on fresh repeats than the config's own values, which these are.\n";
+  }
   Json values = Json::object();
   for (const Gene& gene : config.problem.genes) {
-    values[table[gene.row].key] = report.best.values[gene.row];
+    values[table[gene.row].key] = report.best[gene.row];
     text += fmt::format("  {:<22} {}\n", table[gene.row].key,
-                        table.format(gene.row, report.best.values[gene.row]));
+                        table.format(gene.row, report.best[gene.row]));
   }
   context.console.result(text, {{"repeats", command.settings.repeats},
                                 {"evaluations", report.evaluations},
                                 {"config_spread_m", number_or_null(report.standard_spread)},
                                 {"config_fresh_m", number_or_null(report.standard_fresh)},
-                                {"best_spread_m", report.best.spread},
-                                {"best_fresh_m", number_or_null(report.best_fresh)},
+                                {"best_spread_m", number_or_null(report.best_spread)},
+                                {"best_fresh_m", report.best_fresh},
+                                {"beats_config", report.beats_standard},
                                 {"best", values}});
   context.console.note("wrote: " + (out / "model.toml").string() + ", stability.csv");
   return kExitDone;

@@ -150,10 +150,13 @@ struct StablePoint {
 };
 
 struct StabilityReport {
-  std::optional<double> standard_spread;  // at the config's own values
-  StablePoint best;
-  // The same two on repeats that the search did not see.
-  std::optional<double> standard_fresh, best_fresh;
+  std::optional<double> standard_spread, standard_fresh;  // at the config's own values
+  // The least on fresh repeats, which the search did not see, of its best few points and the
+  // config's own values; where none beats these, they are it.
+  ParameterValues best;
+  std::optional<double> best_spread;  // on the search's repeats
+  double best_fresh = 0;
+  bool beats_standard = false;
   std::vector<StablePoint> tried;  // that ended well, in order
   std::uint64_t evaluations = 0;
 };

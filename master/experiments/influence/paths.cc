@@ -52,6 +52,7 @@ std::span<const PathPoint> first(const std::vector<PathPoint>& path, std::size_t
 
 constexpr std::uint64_t kFreshNoise = 1u << 20;
 constexpr int kMostIdleRounds = 100;
+constexpr std::size_t kFinalists = 5;  // points of the search that are tried on fresh repeats
 
 // Spread at each genome; an empty genome stands for the problem's own values.
 Result<std::vector<std::optional<double>>> spreads_at(Farm& farm, const Problem& problem,
@@ -167,31 +168,43 @@ Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
     return spreads_at(farm, problem, settings, genomes, first_repeat);
   };
   StabilityReport report;
-  // The config's own values, then the points, then those two and the best on fresh repeats.
-  const std::uint64_t tasks =
-      traces_of_a_set(problem, settings.trace) * settings.repeats * (settings.evaluations + 3);
+  // The config's own values, then the points, then those and the best points on fresh repeats.
+  const std::uint64_t tasks = traces_of_a_set(problem, settings.trace) * settings.repeats *
+                              (settings.evaluations + 2 + kFinalists);
   hooks.planned({{"try points", 1, tasks}});
   hooks.began(0);
   ASSIGN_OR_RETURN(auto standard, spreads({{}}, 0));
   report.standard_spread = standard.front();
+  std::vector<std::pair<double, Genome>> ended;
   for (int idle = 0; optimiser->evaluations() < settings.evaluations && idle < kMostIdleRounds;) {
     std::vector<Genome> genomes = mapped(optimiser->ask(), &Candidate::genome);
     ASSIGN_OR_RETURN(const auto found, spreads(genomes, 0));
     for (std::size_t i = 0; i < genomes.size(); ++i) {
-      if (found[i]) report.tried.push_back({problem.values_of(genomes[i]), *found[i]});
+      if (!found[i]) continue;
+      report.tried.push_back({problem.values_of(genomes[i]), *found[i]});
+      ended.emplace_back(*found[i], genomes[i]);
     }
     optimiser->tell(scores_of(found));
     idle = genomes.empty() ? idle + 1 : 0;
   }
   report.evaluations = optimiser->evaluations();
-  const Individual& best = optimiser->best();
-  if (best.standing.outcome != v1::OK) {
+  std::ranges::sort(ended);
+  ended.erase(std::ranges::unique(ended).begin(), ended.end());
+  ended.resize(std::min(ended.size(), kFinalists));
+  std::vector<Genome> finalists = mapped(ended, &std::pair<double, Genome>::second);
+  finalists.insert(finalists.begin(), Genome());
+  ASSIGN_OR_RETURN(const auto fresh, spreads(finalists, kFreshNoise));
+  const auto least = std::ranges::min_element(
+      fresh, {}, [](const auto& spread) { return spread.value_or(INFINITY); });
+  const auto chosen = static_cast<std::size_t>(least - fresh.begin());
+  if (ended.empty() || !*least) {
     return Error{"no point of the searched box ends well; narrow the genes' ranges"};
   }
-  report.best = {problem.values_of(best.genome), best.standing.cost};
-  ASSIGN_OR_RETURN(const auto fresh, spreads({{}, best.genome}, kFreshNoise));
   report.standard_fresh = fresh[0];
-  report.best_fresh = fresh[1];
+  report.best = problem.values_of(finalists[chosen]);
+  report.best_spread = chosen == 0 ? report.standard_spread : ended[chosen - 1].first;
+  report.best_fresh = **least;
+  report.beats_standard = chosen != 0;
   return report;
 }
 

@@ -112,23 +112,48 @@ TEST(EndSpread, IsTheScatterOfTheLastPoints) {
   EXPECT_EQ(end_spread(std::vector{at(2), PathSet{false, {}}}), std::nullopt);
 }
 
-TEST(Stability, FindsCalmerSettings) {
-  tests::WorkerFarm farm;
-  const Config config = parse_config(
-                            "scenario = \"racquetball\"\n[commands.serve]\nduration = 2.5\n"
-                            "[genes]\nball_restitution = [0.5, 1]\nlinear_damping = [0, 0.9]\n",
-                            "r.toml")
-                            .value();
+Config stability_config(const std::string& genes) {
+  return parse_config(
+             "scenario = \"racquetball\"\n[commands.serve]\nduration = 2.5\n[genes]\n" + genes,
+             "r.toml")
+      .value();
+}
+
+StabilitySettings stability_settings(const Config& config) {
   StabilitySettings settings;
   settings.trace.commands = config.problem.commands;
   settings.repeats = 6;
   settings.evaluations = 60;
   settings.evolution.population = 12;
+  return settings;
+}
+
+TEST(Stability, FindsCalmerSettings) {
+  tests::WorkerFarm farm;
+  const Config config =
+      stability_config("ball_restitution = [0.5, 1]\nlinear_damping = [0, 0.9]\n");
+  const auto report = find_stability(farm, config.problem, stability_settings(config));
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_TRUE(report->beats_standard);
+  EXPECT_LT(*report->best_spread, *report->standard_spread);
+  EXPECT_LT(report->best_fresh, *report->standard_fresh) << "not only on the repeats it saw";
+  EXPECT_GE(report->evaluations, 60U);
+}
+
+// Two repeats are a matter of luck: what ends near by on these does not on others.
+TEST(Stability, KeepsTheConfigsValuesWhereNoneIsCalmerOnFreshRepeats) {
+  tests::WorkerFarm farm;
+  const Config config =
+      stability_config("ball_restitution = [0.5, 0.6]\n[parameters]\nball_restitution = 0.52\n");
+  StabilitySettings settings = stability_settings(config);
+  settings.repeats = 2;
   const auto report = find_stability(farm, config.problem, settings);
   ASSERT_TRUE(report.ok()) << report.error().message;
-  EXPECT_LT(report->best.spread, *report->standard_spread);
-  EXPECT_LT(*report->best_fresh, *report->standard_fresh) << "not only on the repeats it saw";
-  EXPECT_GE(report->evaluations, 60U);
+  EXPECT_LT(std::ranges::min(mapped(report->tried, &StablePoint::spread)),
+            *report->standard_spread);
+  EXPECT_FALSE(report->beats_standard);
+  EXPECT_EQ(report->best, config.problem.values);
+  EXPECT_EQ(report->best_fresh, *report->standard_fresh);
 }
 
 TEST(Influence, OfPushesLooksBeyondTheFirstTouch) {
