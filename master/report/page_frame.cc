@@ -98,14 +98,13 @@ void PlainPage::paragraph(std::string_view content) {
   body_ += fmt::format("<p>{}</p>\n", html_escaped(content));
 }
 
-void PlainPage::table(const std::vector<std::string>& header,
-                      const std::vector<std::vector<std::string>>& rows) {
+void PlainPage::table(const TextTable& table) {
   body_ += "<div class=\"scroll\"><table>\n<thead><tr>";
-  for (const std::string& cell : header) {
+  for (const std::string& cell : table.head) {
     body_ += fmt::format("<th scope=\"col\">{}</th>", html_escaped(cell));
   }
   body_ += "</tr></thead>\n<tbody>\n";
-  for (const std::vector<std::string>& row : rows) {
+  for (const TextTable::Row& row : table.rows) {
     body_ += "<tr>";
     for (const std::string& cell : row) body_ += fmt::format("<td>{}</td>", html_escaped(cell));
     body_ += "</tr>\n";

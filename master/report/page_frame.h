@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/text_table.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
@@ -63,8 +64,7 @@ class PlainPage {
   void heading(std::string_view content);
   void paragraph(std::string_view content);
   // Columns after the first are aligned to the right.
-  void table(const std::vector<std::string>& header,
-             const std::vector<std::vector<std::string>>& rows);
+  void table(const TextTable& table);
   // `svg` as Svg::finish() gives it; `words` describe it to those who cannot see it.
   void picture(std::string_view svg, std::string_view content);
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/base/text_table.h"
 #include "common/parameters/ground.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
@@ -126,28 +127,24 @@ struct NamedWidths {
   std::vector<WidthsAt> widths;
 };
 
-std::string table_text(const DrivePlan& drive, const std::vector<NamedWidths>& others) {
+TextTable table_of(const DrivePlan& drive, const std::vector<NamedWidths>& others) {
   const double end = drive.widths.back().t_s;
-  std::vector<const WidthsAt*> columns;
-  std::string text = fmt::format("{:<16}", "90 % interval");
+  TextTable table{{"90 % interval"}, mapped(drive.rows, [](const KinematicRow& row) {
+                    return TextTable::Row{row.name};
+                  })};
   const auto column = [&](const std::vector<WidthsAt>& widths, double t, const std::string& name) {
-    columns.push_back(&last_before(widths, t));
-    text += fmt::format(" {:>15}", fmt::format("{:.0f} s{}", columns.back()->t_s, name));
+    const WidthsAt& at = last_before(widths, t);
+    table.head.push_back(fmt::format("{:.0f} s{}", at.t_s, name));
+    for (std::size_t k = 0; k < table.rows.size(); ++k) {
+      table.rows[k].push_back(width_text(drive.rows[k], at.widths[k]));
+    }
   };
   for (const double mark : kMarks_s) {
     if (mark < 0.9 * end) column(drive.widths, mark, "");
   }
   column(drive.widths, end, "");
   for (const NamedWidths& other : others) column(other.widths, end, " " + other.name);
-  text += "\n";
-  for (std::size_t k = 0; k < drive.rows.size(); ++k) {
-    text += fmt::format("{:<16}", drive.rows[k].name);
-    for (const WidthsAt* at : columns) {
-      text += fmt::format(" {:>15}", width_text(drive.rows[k], at->widths[k]));
-    }
-    text += "\n";
-  }
-  return text;
+  return table;
 }
 
 Json widths_json(const std::vector<WidthsAt>& widths) {
@@ -168,7 +165,7 @@ std::pair<std::string, Json> result_of(const DrivePlan& drive,
           "noise (of the config; a fitted model knows it better): "
           "{:.2g} m and {:.2g} rad a reading, {:.2g} m and {:.2g} rad after a metre\n",
           noise.position_m, noise.heading_rad, noise.travel, noise.turn) +
-      table_text(drive, others);
+      table_of(drive, others).text("<>");
   Json json = {{"out", out}};
   json["values"] = mapped(drive.rows, [](const KinematicRow& row) -> Json {
     return {{"name", row.name}, {"unit", row.unit}};

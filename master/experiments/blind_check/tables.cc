@@ -3,6 +3,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/base/text_table.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/math/rank_tests.h"
@@ -126,65 +127,48 @@ Json case_json(const ScoredCase& c) {
   return json;
 }
 
-std::string row_of_cells(const std::vector<std::string>& cells) {
-  return "| " + joined(cells, " | ") + " |\n";
+TextTable rates_table(const Tally& sum) {
+  return {{"what", "wanted", "found [95 % interval]", "cases"},
+          mapped(rate_rows(sum), [](const RateRow& row) -> TextTable::Row {
+            return {row.label, row.wanted, percent(row.rate), counts(row.rate)};
+          })};
 }
 
-std::string table_head(const std::vector<std::string>& cells) {
-  return row_of_cells(cells) + row_of_cells(std::vector<std::string>(cells.size(), "---"));
-}
-
-std::string rates_markdown(const Tally& sum) {
-  return table_head({"what", "wanted", "found [95 % interval]", "cases"}) +
-         joined(rate_rows(sum), "", [](const RateRow& row) {
-           return row_of_cells({row.label, row.wanted, percent(row.rate), counts(row.rate)});
-         });
-}
-
-std::string effects_markdown(const Tally& sum) {
-  std::set<std::string> levels;
-  for (const auto& [effect, rates] : sum.by_effect) {
-    for (const auto& [level, rate] : rates) levels.insert(level);
+// A line for each row, a column for each key that any of them has.
+template <class Value, class Text>
+TextTable pivot(const std::string& corner,
+                const std::map<std::string, std::map<std::string, Value>>& rows,
+                const std::string& missing, Text text) {
+  std::set<std::string> keys;
+  for (const auto& [name, row] : rows) {
+    for (const auto& [key, value] : row) keys.insert(key);
   }
-  std::vector<std::string> head = {"effect"};
-  for (const std::string& level : levels) head.push_back(level + ", right");
-  head.push_back("parameters covered");
-  std::string text = table_head(head);
-  for (const auto& [effect, rates] : sum.by_effect) {
-    std::vector<std::string> cells = {effect};
-    for (const std::string& level : levels) {
-      const Rate* rate = find_in(rates, level);
-      cells.push_back(rate ? counts(*rate) : "-");
+  TextTable table{{corner}};
+  append(table.head, keys);
+  for (const auto& [name, row] : rows) {
+    table.rows.push_back({name});
+    for (const std::string& key : keys) {
+      const Value* value = find_in(row, key);
+      table.rows.back().push_back(value ? text(*value) : missing);
     }
+  }
+  return table;
+}
+
+TextTable effects_table(const Tally& sum) {
+  TextTable table = pivot("effect", sum.by_effect, "-", counts);
+  for (std::size_t i = 1; i < table.head.size(); ++i) table.head[i] += ", right";
+  table.head.push_back("parameters covered");
+  for (TextTable::Row& row : table.rows) {
     Rate covered;
     for (const auto& [key, rate] : sum.covered_by_parameter) {
-      if (key.compare(0, effect.size() + 1, effect + ".") != 0) continue;
+      if (!key.starts_with(row.front() + ".")) continue;
       covered.hits += rate.hits;
       covered.total += rate.total;
     }
-    cells.push_back(covered.total ? counts(covered) : "-");
-    text += row_of_cells(cells);
+    row.push_back(covered.total ? counts(covered) : "-");
   }
-  return text;
-}
-
-std::string confusion_markdown(const Tally& sum) {
-  std::set<std::string> reported;
-  for (const auto& [truth, row] : sum.confusion) {
-    for (const auto& [name, count] : row) reported.insert(name);
-  }
-  std::vector<std::string> head = {"truth \\ reported first"};
-  append(head, reported);
-  std::string text = table_head(head);
-  for (const auto& [truth, row] : sum.confusion) {
-    std::vector<std::string> cells = {truth};
-    for (const std::string& name : reported) {
-      const unsigned* count = find_in(row, name);
-      cells.push_back(count ? std::to_string(*count) : "");
-    }
-    text += row_of_cells(cells);
-  }
-  return text;
+  return table;
 }
 
 std::string effects_text(const Truth& truth) {
@@ -207,22 +191,22 @@ std::string reported_text(const ScoredCase& c) {
   return text;
 }
 
-std::string cases_markdown(const std::vector<ScoredCase>& cases) {
-  std::string text = table_head({"case", "kind", "level", "truth", "said", "right", "covered",
-                                 "promised", "realised", "s", "CPU s"});
+TextTable cases_table(const std::vector<ScoredCase>& cases) {
+  TextTable table{{"case", "kind", "level", "truth", "said", "right", "covered", "promised",
+                   "realised", "s", "CPU s"}};
   for (const ScoredCase& c : cases) {
     Rate covered;
     for (const Coverage& p : c.coverage) covered.add(p.covered);
-    text +=
-        row_of_cells({c.truth.id, c.has_truth ? case_kind_name(c.truth.kind) : "-", c.truth.level,
-                      c.has_truth ? effects_text(c.truth) : "-", reported_text(c),
-                      !c.has_truth        ? "-"
-                      : c.judgement.right ? "yes"
-                                          : "NO",
-                      covered.total ? counts(covered) : "-", share(c.promised), share(c.realised),
-                      formatted("%.0f", c.end.wall_s), formatted("%.0f", c.end.cpu_s)});
+    table.rows.push_back(
+        {c.truth.id, c.has_truth ? case_kind_name(c.truth.kind) : "-", c.truth.level,
+         c.has_truth ? effects_text(c.truth) : "-", reported_text(c),
+         !c.has_truth        ? "-"
+         : c.judgement.right ? "yes"
+                             : "NO",
+         covered.total ? counts(covered) : "-", share(c.promised), share(c.realised),
+         formatted("%.0f", c.end.wall_s), formatted("%.0f", c.end.cpu_s)});
   }
-  return text;
+  return table;
 }
 
 }  // namespace
@@ -256,29 +240,29 @@ std::string format_blind_markdown(const BlindReport& report) {
   const Tally sum = tally(report.cases);
   std::string text = "# Blind check\n\n";
   for (const auto& [label, value] : report.provenance) text += "- " + label + ": `" + value + "`\n";
-  text += "\n## Rates\n\n" + rates_markdown(sum);
-  text += "\n## Single effects\n\n" + effects_markdown(sum);
+  text += "\n## Rates\n\n" + rates_table(sum).markdown();
+  text += "\n## Single effects\n\n" + effects_table(sum).markdown();
   text += "\n## Confusion\n\nTrue family against what was reported first.\n\n" +
-          confusion_markdown(sum);
+          pivot("truth \\ reported first", sum.confusion, "", [](unsigned count) {
+            return std::to_string(count);
+          }).markdown();
   if (!report.out_of_reach.empty()) {
+    const TextTable table{{"effect", "level", "greatest size"},
+                          mapped(report.out_of_reach, [](const OutOfReach& o) -> TextTable::Row {
+                            return {o.effect, o.level, short_number(o.size)};
+                          })};
     text +=
         "\n## Out of reach\n\nNo strength within the catalogue's bounds is as large as wanted "
         "on this experiment; these cases were not made.\n\n" +
-        table_head({"effect", "level", "greatest size"});
-    for (const OutOfReach& o : report.out_of_reach) {
-      text += row_of_cells({o.effect, o.level, short_number(o.size)});
-    }
+        table.markdown();
   }
-  return text + "\n## Cases\n\n" + cases_markdown(report.cases);
+  return text + "\n## Cases\n\n" + cases_table(report.cases).markdown();
 }
 
 std::string format_blind_summary(const BlindReport& report) {
-  std::string text;
-  for (const RateRow& row : rate_rows(tally(report.cases))) {
-    if (row.rate.total == 0) continue;
-    text += formatted("%-52s %-16s %9s  %s\n", row.label.c_str(), percent(row.rate).c_str(),
-                      counts(row.rate).c_str(), row.wanted.c_str());
-  }
+  TextTable rates = rates_table(tally(report.cases));
+  std::erase_if(rates.rows, [](const TextTable::Row& row) { return row.back() == "0/0"; });
+  std::string text = rates.text("<<>>");
   for (const ScoredCase& c : report.cases) {
     if (c.has_truth && c.judgement.right) continue;
     text += (c.has_truth ? "WRONG " : "      ") + c.truth.id + ": " +

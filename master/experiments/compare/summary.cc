@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/base/ranges.h"
+#include "common/base/text_table.h"
 #include "common/trials/text/csv.h"
 #include "master/experiments/compare/compare.h"
 #include "master/report/figures/figures.h"
@@ -108,11 +109,6 @@ void add_ranks(const std::vector<std::vector<double>>& blocks, ComparisonSummary
   }
 }
 
-std::string range_text(double lower, double upper) {
-  if (std::isnan(lower)) return "–";
-  return number_text(lower) + " to " + number_text(upper);
-}
-
 LineChart convergence_chart(const ComparisonSummary& summary) {
   LineChart chart;
   chart.title = "Best so far: median over seeds, band between the quartiles";
@@ -144,30 +140,39 @@ LineChart convergence_chart(const ComparisonSummary& summary) {
   return chart;
 }
 
-void add_results(const ComparisonSummary& summary, PlainPage& page) {
-  std::vector<std::string> header = {"variant", "median", "95 % of it", "mean rank"};
-  if (summary.target) {
-    header.insert(header.end(),
-                  {"success", "95 % of it", "median to target", "expected to target"});
-  }
-  std::vector<std::vector<std::string>> rows;
+std::string short_text(double value) { return fmt::format("{:.4g}", value); }
+
+TextTable results_of(const ComparisonSummary& summary) {
+  TextTable table{{summary.fitness, "median", "95 % of the median", "mean rank"}};
+  if (summary.target)
+    append(table.head, TextTable::Row{"success", "median to target", "expected to target"});
+  const auto whole = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.0f}", *value) : std::string("-");
+  };
   for (const VariantSummary& v : summary.variants) {
-    rows.push_back({v.name, number_text(v.median), range_text(v.median_95.lower, v.median_95.upper),
-                    number_text(v.mean_rank)});
+    const auto [lower, upper] = v.median_95;
+    const std::string range =
+        std::isnan(lower) ? "-" : short_text(lower) + " to " + short_text(upper);
+    table.rows.push_back({v.name, short_text(v.median), range, fmt::format("{:.2f}", v.mean_rank)});
     if (!summary.target) continue;
-    const auto count = [](const std::optional<double>& value) {
-      return value ? number_text(std::round(*value), 4) : std::string("–");
-    };
-    rows.back().insert(rows.back().end(), {fmt::format("{} of {}", v.successes, summary.seeds),
-                                           percent_text(v.success_95.lower) + " to " +
-                                               percent_text(v.success_95.upper),
-                                           count(v.median_to_target), count(v.expected_to_target)});
+    append(table.rows.back(),
+           TextTable::Row{fmt::format("{}/{}", v.successes, summary.seeds),
+                          whole(v.median_to_target), whole(v.expected_to_target)});
   }
   for (const Baseline& baseline : summary.baselines) {
-    rows.push_back({baseline.name, baseline.fitness ? number_text(*baseline.fitness) : "–"});
-    rows.back().resize(header.size());
+    table.rows.push_back({baseline.name, baseline.fitness ? short_text(*baseline.fitness) : "-"});
   }
-  page.table(header, rows);
+  return table;
+}
+
+void add_results(const ComparisonSummary& summary, PlainPage& page) {
+  TextTable table = results_of(summary);
+  if (summary.target) table.head.push_back("95 % of the success");
+  for (std::size_t v = 0; summary.target && v < summary.variants.size(); ++v) {
+    const auto [lower, upper] = summary.variants[v].success_95;
+    table.rows[v].push_back(percent_text(lower) + " to " + percent_text(upper));
+  }
+  page.table(table);
 }
 
 void add_ranks(const ComparisonSummary& summary, PlainPage& page) {
@@ -178,16 +183,15 @@ void add_ranks(const ComparisonSummary& summary, PlainPage& page) {
                   "p = {}. The table holds Mann-Whitney p-values of the final fitness of two "
                   "variants, adjusted by Holm for the number of pairs.",
                   number_text(summary.all.statistic), p_text(summary.all.p)));
-  std::vector<std::string> header = {""};
-  std::vector<std::vector<std::string>> rows;
+  TextTable table{{""}};
   for (std::size_t a = 0; a < summary.variants.size(); ++a) {
-    header.push_back(summary.variants[a].name);
-    rows.push_back({summary.variants[a].name});
+    table.head.push_back(summary.variants[a].name);
+    table.rows.push_back({summary.variants[a].name});
     for (std::size_t b = 0; b < summary.variants.size(); ++b) {
-      rows.back().push_back(a == b ? "" : p_text(summary.pair_p[a][b]));
+      table.rows.back().push_back(a == b ? "" : p_text(summary.pair_p[a][b]));
     }
   }
-  page.table(header, rows);
+  page.table(table);
 }
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
@@ -257,39 +261,14 @@ std::string comparison_page(const ComparisonSummary& summary, const std::string&
   }
   add_ranks(summary, page);
   page.heading("Inputs");
-  page.table({"", ""}, mapped(provenance, [](const auto& row) -> std::vector<std::string> {
-               return {row.first, row.second};
-             }));
+  page.table({{"", ""}, mapped(provenance, [](const auto& row) -> TextTable::Row {
+                return {row.first, row.second};
+              })});
   return page.finish();
 }
 
 std::string comparison_text(const ComparisonSummary& summary) {
-  std::size_t width = 20;
-  for (const VariantSummary& v : summary.variants) width = std::max(width, v.name.size());
-  std::string text = fmt::format("{:<{}}  {:>10}  {:>22}  {:>5}", summary.fitness, width, "median",
-                                 "95 % of the median", "rank");
-  if (summary.target) text += fmt::format("  {:>9}  {:>9}  {:>9}", "success", "median to", "ERT");
-  text += "\n";
-  for (const VariantSummary& v : summary.variants) {
-    const std::string range =
-        std::isnan(v.median_95.lower)
-            ? "-"
-            : fmt::format("{:.4g} to {:.4g}", v.median_95.lower, v.median_95.upper);
-    text += fmt::format("{:<{}}  {:>10.4g}  {:>22}  {:>5.2f}", v.name, width, v.median, range,
-                        v.mean_rank);
-    if (summary.target) {
-      const auto whole = [](const std::optional<double>& value) {
-        return value ? fmt::format("{:.0f}", *value) : std::string("-");
-      };
-      text += fmt::format("  {:>9}  {:>9}  {:>9}", fmt::format("{}/{}", v.successes, summary.seeds),
-                          whole(v.median_to_target), whole(v.expected_to_target));
-    }
-    text += "\n";
-  }
-  for (const Baseline& baseline : summary.baselines) {
-    text += fmt::format("{:<{}}  {:>10}\n", baseline.name, width,
-                        baseline.fitness ? fmt::format("{:.4g}", *baseline.fitness) : "-");
-  }
+  std::string text = results_of(summary).text("<>");
   if (summary.variants.size() > 1) {
     text += fmt::format("all alike? Friedman over seeds: chi-square {:.3g}, p = {:.2g}\n",
                         summary.all.statistic, summary.all.p);

@@ -202,22 +202,22 @@ std::string drive_page(const DriveReport& report, const std::string& title) {
   const LineChart floor = floor_chart(report);
   page.picture(line_chart(floor), floor.title);
   page.heading("Where the runs end");
-  std::vector<std::vector<std::string>> rows;
+  TextTable table{{"driver", "runs", "x, m", "y, m", "heading, rad",
+                   fmt::format("{:.0f} % ellipse, half axes, mm", 100 * report.coverage),
+                   "heading s.d., rad", "Frechet to the real path, m", "Hausdorff, m",
+                   "Lettier, m"}};
   for (const DriverReport& driver : report.drivers) {
     const EndEllipse& end = driver.end;
-    rows.push_back({driver.name, std::to_string(driver.runs.size()),
-                    fmt::format("{:.4f}", end.mean.x), fmt::format("{:.4f}", end.mean.y),
-                    fmt::format("{:.4f}", end.mean.theta),
-                    fmt::format("{:.1f} by {:.1f}", 1e3 * end.major_m, 1e3 * end.minor_m),
-                    fmt::format("{:.3f}", end.heading_deviation_rad)});
+    table.rows.push_back({driver.name, std::to_string(driver.runs.size()),
+                          fmt::format("{:.4f}", end.mean.x), fmt::format("{:.4f}", end.mean.y),
+                          fmt::format("{:.4f}", end.mean.theta),
+                          fmt::format("{:.1f} by {:.1f}", 1e3 * end.major_m, 1e3 * end.minor_m),
+                          fmt::format("{:.3f}", end.heading_deviation_rad)});
     for (std::size_t k = 0; k < kPathDistances.size(); ++k) {
-      rows.back().push_back(driver.real ? distance_text((*driver.real)[k]) : "–");
+      table.rows.back().push_back(driver.real ? distance_text((*driver.real)[k]) : "–");
     }
   }
-  page.table({"driver", "runs", "x, m", "y, m", "heading, rad",
-              fmt::format("{:.0f} % ellipse, half axes, mm", 100 * report.coverage),
-              "heading s.d., rad", "Frechet to the real path, m", "Hausdorff, m", "Lettier, m"},
-             rows);
+  page.table(table);
   page.heading("How runs spread");
   page.paragraph(
       "Each band holds whole paths: a path counts as inside only when every point of it is, in x, "

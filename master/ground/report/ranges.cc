@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/text_table.h"
 #include "common/json/json.h"
 #include "common/json/matrix.h"
 #include "common/math/algebra.h"
@@ -258,21 +259,21 @@ std::string ranges_yaml(const Json& ranges) {
 
 std::string ranges_table(const Ranges& ranges) {
   const bool models = ranges.robot && has_simulator_model(*ranges.robot);
-  constexpr const char* kLine = "{:<22} {:<5} {:>10} {:>9} {:>9} {:>9}  {:<22} {} / {}";
-  std::string text = fmt::format(fmt::runtime(kLine), "value", "unit", "mean", "sd", "error",
-                                 "varies", "90 %", "MuJoCo", "SDF\n");
+  TextTable table{{"value", "unit", "mean", "sd", "error", "varies", "90 %", "MuJoCo / SDF"}};
   const auto place = [&](std::string_view in) {
     return models && !in.empty() ? std::string(in) : std::string("-");
   };
+  const auto number = [](double x, int digits) { return fmt::format("{:.{}g}", x, digits); };
   for (const ValueRange& v : ranges.values) {
-    const auto number = [](double x, int digits) { return fmt::format("{:.{}g}", x, digits); };
-    text += fmt::format(fmt::runtime(kLine), v.name, v.unit, number(v.mean, 4), number(v.sd, 2),
-                        ranges.robot ? number(v.error, 2) : "-",
-                        ranges.robot ? number(v.varies, 2) : "-",
-                        fmt::format("[{:.4g}, {:.4g}]", v.interval.lower, v.interval.upper),
-                        place(simulator_place(v.name).mujoco), place(simulator_place(v.name).sdf));
-    text += v.shown ? "\n" : "; this log does not show it: as wide as is plausible\n";
+    const auto [value, mujoco, sdf] = simulator_place(v.name);
+    table.rows.push_back(
+        {v.name, v.unit, number(v.mean, 4), number(v.sd, 2),
+         ranges.robot ? number(v.error, 2) : "-", ranges.robot ? number(v.varies, 2) : "-",
+         fmt::format("[{:.4g}, {:.4g}]", v.interval.lower, v.interval.upper),
+         place(mujoco) + " / " + place(sdf) +
+             (v.shown ? "" : "; this log does not show it: as wide as is plausible")});
   }
+  std::string text = table.text("<<>>>><");
   for (const WindowScatter& s : ranges.scatter) {
     text += fmt::format(
         "what no value explains of {:.3g} s: {:.2g} m along, {:.2g} m across, {:.2g} rad (sd)\n",

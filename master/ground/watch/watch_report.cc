@@ -7,6 +7,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/base/text_table.h"
 #include "common/json/fields.h"
 #include "common/math/laws.h"
 #include "master/infer/settings.h"
@@ -29,12 +30,8 @@ std::string names_of(const WatchedFleet& fleet, const std::vector<std::size_t>& 
   return joined(robots, ", ", [&](std::size_t u) { return fleet.robots[u].name; });
 }
 
-// Of one finding: robot, since when, between which runs, what, by how much, how sure.
-using Line = std::vector<std::string>;
-const Line kHead = {"robot", "since run", "within runs", "what", "by (90 %)", "chance"};
-
-std::vector<Line> finding_lines(const WatchedFleet& fleet, const FleetChanges& changes) {
-  std::vector<Line> lines;
+TextTable findings_of(const WatchedFleet& fleet, const FleetChanges& changes) {
+  TextTable table{{"robot", "since run", "within runs", "what", "by (90 %)", "chance"}};
   for (const ValueStep& step : changes.steps) {
     const WatchedRobot& robot = fleet.robots[step.robots.front()];
     const WatchedValue& value = fleet.rows.values[step.value];
@@ -43,17 +40,17 @@ std::vector<Line> finding_lines(const WatchedFleet& fleet, const FleetChanges& c
       if (k == step.value || step.shares[k] < kShownShare) continue;
       what += fmt::format("; or {} ({:.0f} %)", fleet.rows.values[k].thing, 100 * step.shares[k]);
     }
-    lines.push_back({names_of(fleet, step.robots), robot.runs[step.onset],
-                     robot.runs[step.onset_first] + " to " + robot.runs[step.onset_last], what,
-                     change_text(value, step),
-                     fmt::format("{:.0f} %", 100 * step.shares[step.value])});
+    table.rows.push_back({names_of(fleet, step.robots), robot.runs[step.onset],
+                          robot.runs[step.onset_first] + " to " + robot.runs[step.onset_last], what,
+                          change_text(value, step),
+                          fmt::format("{:.0f} %", 100 * step.shares[step.value])});
   }
   for (const OddRobot& odd : changes.odd_robots) {
     const WatchedValue& value = fleet.rows.values[odd.value];
-    lines.push_back({fleet.robots[odd.robot].name, "the first", "",
-                     value.thing + ", from the others'", change_text(value, odd), ""});
+    table.rows.push_back({fleet.robots[odd.robot].name, "the first", "",
+                          value.thing + ", from the others'", change_text(value, odd), ""});
   }
-  return lines;
+  return table;
 }
 
 std::string run_name(const WatchedFleet& fleet, std::size_t robot, std::size_t run) {
@@ -210,18 +207,7 @@ std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes) {
       sum_of(fleet.robots, [](const WatchedRobot& robot) { return robot.runs.size(); });
   std::string text = fmt::format("{} robots, {} runs, {} of them fitted now\n", fleet.robots.size(),
                                  runs, fleet.fitted);
-  std::vector<Line> lines = finding_lines(fleet, changes);
-  if (!lines.empty()) lines.insert(lines.begin(), kHead);
-  std::vector<std::size_t> widths(kHead.size());
-  for (const Line& line : lines) {
-    for (std::size_t c = 0; c < line.size(); ++c) widths[c] = std::max(widths[c], line[c].size());
-  }
-  for (const Line& line : lines) {
-    std::string row;
-    for (std::size_t c = 0; c < line.size(); ++c)
-      row += fmt::format("{:<{}}  ", line[c], widths[c]);
-    text += row.substr(0, row.find_last_not_of(' ') + 1) + "\n";
-  }
+  text += findings_of(fleet, changes).text();
   for (const OddRun& odd : changes.odd_runs) text += odd_run_text(fleet, odd) + "\n";
   for (const WatchedSkip& skip : fleet.skipped) text += skip_text(skip) + "\n";
   return text + verdict(fleet, changes) + "\n";
@@ -259,8 +245,8 @@ Json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
 std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
   PlainPage page("What changed since when");
   page.paragraph(verdict(fleet, changes));
-  const std::vector<Line> lines = finding_lines(fleet, changes);
-  if (!lines.empty()) page.table(kHead, lines);
+  const TextTable findings = findings_of(fleet, changes);
+  if (!findings.rows.empty()) page.table(findings);
   for (const OddRun& odd : changes.odd_runs) page.paragraph(odd_run_text(fleet, odd));
   page.heading("Values over runs");
   page.paragraph(
@@ -278,17 +264,16 @@ std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
     page.picture(line_chart(chart), chart.title);
   }
   page.heading("What all share, and by how much robots and runs differ");
-  std::vector<Line> rows;
+  TextTable table{
+      {"value", "shared", "standard error", "from robot to robot", "from run to run", "unit"}};
   for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
     const SharedValue& of = changes.shared[k];
     const auto short_text = [](double number) { return fmt::format("{:.2g}", number); };
-    rows.push_back({fleet.rows.rows[k].name, fmt::format("{:.5g}", of.value), short_text(of.error),
-                    short_text(of.between_robots), short_text(of.between_runs),
-                    fleet.rows.rows[k].unit});
+    table.rows.push_back({fleet.rows.rows[k].name, fmt::format("{:.5g}", of.value),
+                          short_text(of.error), short_text(of.between_robots),
+                          short_text(of.between_runs), fleet.rows.rows[k].unit});
   }
-  page.table(
-      {"value", "shared", "standard error", "from robot to robot", "from run to run", "unit"},
-      rows);
+  page.table(table);
   if (!fleet.skipped.empty()) page.heading("Omitted");
   for (const WatchedSkip& skip : fleet.skipped) page.paragraph(skip_text(skip));
   return page.finish();

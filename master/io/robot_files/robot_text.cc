@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/base/text.h"
+#include "common/base/text_table.h"
 #include "common/json/json.h"
 #include "common/parameters/ground.h"
 #include "master/io/robot_files/understand.h"
@@ -109,28 +110,16 @@ std::vector<double> known_loads(const RobotReading& reading, const GroundRobot& 
 }
 
 std::string wheel_table(const RobotReading& reading, const GroundRobot& completed) {
-  std::vector<std::vector<std::string>> rows = {
-      {"wheel", "role", "x m", "y m", "radius m", "width m", "load N", "from"}};
+  TextTable table{{"wheel", "role", "x m", "y m", "radius m", "width m", "load N", "from"}};
   const std::vector<double> loads = known_loads(reading, completed);
   for (std::size_t i = 0; i < completed.wheels.size(); ++i) {
     const RobotWheel& wheel = completed.wheels[i];
     const WheelSource source = source_of(reading, wheel.name);
-    rows.push_back({wheel.name, role(wheel), number(wheel.x_m), number(wheel.y_m),
-                    number(wheel.radius_m), number(wheel.width_m),
-                    loads.empty() ? "-" : number(loads[i], "%.1f"), source_text(source)});
+    table.rows.push_back({wheel.name, role(wheel), number(wheel.x_m), number(wheel.y_m),
+                          number(wheel.radius_m), number(wheel.width_m),
+                          loads.empty() ? "-" : number(loads[i], "%.1f"), source_text(source)});
   }
-  std::vector<std::size_t> widths(rows[0].size(), 0);
-  for (const auto& row : rows) {
-    for (std::size_t i = 0; i + 1 < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  }
-  std::string text;
-  for (const auto& row : rows) {
-    text += "  ";
-    for (std::size_t i = 0; i + 1 < row.size(); ++i)
-      text += row[i] + std::string(widths[i] + 2 - row[i].size(), ' ');
-    text += row.back() + "\n";
-  }
-  return text;
+  return table.text("<", "  ");
 }
 
 std::string list(const std::string& heading, const std::vector<std::string>& sentences) {

@@ -7,6 +7,7 @@
 #include "common/base/hash.h"
 #include "common/base/result.h"
 #include "common/base/text.h"
+#include "common/base/text_table.h"
 
 namespace gapfarm::base_test {
 
@@ -50,6 +51,17 @@ TEST(Text, IsCutAtMarksLinesAndBlanks) {
   EXPECT_EQ(tokens_of(" a\tb  c\r\n"), (Views{"a", "b", "c"}));
   EXPECT_EQ(cut_at("a=b=c", '='), std::pair(std::string("a"), std::optional<std::string>("b=c")));
   EXPECT_FALSE(cut_at("a", '=').second);
+}
+
+TEST(TextTable, IsAsWideAsItsCellsInTerminalsAndMarkdown) {
+  const TextTable table{{"what", "m", ""}, {{"μ", "0.5", "*"}, {"longer"}}};
+  EXPECT_EQ(table.text("<><", "  "),
+            "  what      m\n"
+            "  μ       0.5  *\n"
+            "  longer\n");
+  EXPECT_EQ(table.markdown(),
+            "| what | m |  |\n| --- | --- | --- |\n| μ | 0.5 | * |\n| longer |\n");
+  EXPECT_EQ((TextTable{{"what"}}.text()), "");
 }
 
 }  // namespace gapfarm::base_test
