@@ -1,5 +1,6 @@
 // URDFs: no crash, errors with places, and what is understood can be drawn.
 #include "master/io/robot_files/understand.h"
+#include "master/report/figures/figures.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace gapfarm {

@@ -9,6 +9,7 @@
 #include "master/cli/data/robot_setup.h"
 #include "master/io/robot_files/controllers.h"
 #include "master/io/robot_files/understand.h"
+#include "master/report/figures/figures.h"
 
 namespace gapfarm {
 namespace {

@@ -153,9 +153,6 @@ std::string describe_robot(const RobotReading& reading, const GroundRobot& compl
 std::string describe_robot_json(const RobotReading& reading, const GroundRobot& completed,
                                 const std::string& toml);
 
-// The robot from above as SVG: outlines, wheels, axles, loads, centre of mass, a scale.
-std::string draw_robot(const RobotReading& reading, const GroundRobot& completed);
-
 // What a config says of where it comes from and what it is about, as it is to stand there.
 struct RobotConfigTexts {
   std::vector<std::string> made_of;    // files that the robot was read from

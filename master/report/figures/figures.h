@@ -13,6 +13,8 @@
 
 namespace gapfarm {
 
+struct RobotReading;
+
 struct ChartSeries {
   std::string name = {};                         // empty: not in the legend
   std::vector<SvgPoint> line = {};               // data units
@@ -29,6 +31,13 @@ struct ChartLevel {  // a horizontal line
   double y = 0;
 };
 
+struct ChartLabel {
+  std::string text;
+  SvgPoint at;              // data units
+  SvgPoint beside_px = {};  // right of that and below
+  SvgText style = {};
+};
+
 struct LineChart {
   std::string title, x_title, y_title;
   std::string note;                  // below the title
@@ -42,6 +51,7 @@ struct LineChart {
   std::optional<double> x_least, x_most, y_least, y_most;
   std::vector<ChartSeries> series;
   std::vector<ChartLevel> levels;
+  std::vector<ChartLabel> labels;
 };
 
 std::string line_chart(const LineChart& chart);
@@ -79,5 +89,9 @@ struct PredictionOfLog {
 // One panel a command: its trials at the duties and duration that the log has most of.
 std::vector<PosePanel> pose_panels(const Problem& problem,
                                    const std::vector<PredictionOfLog>& predictions);
+
+// A robot from above: outlines, wheels with radii and loads, axles, centre of mass.
+// REQUIRES: `completed` is the reading's robot as complete_robot() leaves it.
+std::string draw_robot(const RobotReading& reading, const GroundRobot& completed);
 
 }  // namespace gapfarm

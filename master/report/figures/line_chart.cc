@@ -269,6 +269,10 @@ void draw_chart(Svg& svg, const LineChart& chart, bool with_legend) {
     }
   }
   svg.end_part();
+  for (const ChartLabel& label : chart.labels) {
+    const SvgPoint p = frame.at(label.at.x, label.at.y);
+    svg.text({p.x + label.beside_px.x, p.y + label.beside_px.y}, label.text, label.style);
+  }
   if (with_legend) {
     draw_legend(svg, chart, {kPlotX, kPlotY + frame.height + kAxis + 8}, chart.width - kPlotX);
   }

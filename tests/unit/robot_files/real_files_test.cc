@@ -8,6 +8,7 @@
 
 #include "common/trials/files.h"
 #include "master/io/robot_files/understand.h"
+#include "master/report/figures/figures.h"
 
 namespace gapfarm::real_files_test {
 

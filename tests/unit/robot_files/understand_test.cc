@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "master/io/robot_files/controllers.h"
+#include "master/report/figures/figures.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
 namespace gapfarm::understand_test {
