@@ -7,6 +7,7 @@
 
 #include "common/base/text.h"
 #include "common/base/text_table.h"
+#include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/parameters/ground.h"
 #include "master/io/robot_files/understand.h"
@@ -199,33 +200,26 @@ std::string describe_robot(const RobotReading& reading, const GroundRobot& compl
 
 std::string describe_robot_json(const RobotReading& reading, const GroundRobot& completed,
                                 const std::string& toml) {
-  using nlohmann::json;
-  const auto optional = [](const std::optional<double>& value) {
-    return value ? json(*value) : json(nullptr);
-  };
+  using json = nlohmann::json;  // keys in the alphabet's order
   json wheels = json::array();
   const std::vector<double> loads = known_loads(reading, completed);
   for (std::size_t i = 0; i < completed.wheels.size(); ++i) {
     const RobotWheel& wheel = completed.wheels[i];
-    const WheelSource source = source_of(reading, wheel.name);
-    wheels.push_back({{"name", wheel.name},
-                      {"kind", wheel_names()[static_cast<std::size_t>(wheel.kind)]},
-                      {"driven", wheel.driven},
-                      {"steered", wheel.steered},
-                      {"x", optional(wheel.x_m)},
-                      {"y", optional(wheel.y_m)},
-                      {"radius", optional(wheel.radius_m)},
-                      {"width", optional(wheel.width_m)},
-                      {"heading", wheel.heading_rad},
-                      {"load_n", loads.empty() ? json(nullptr) : json(loads[i])},
-                      {"joint", source.joint},
-                      {"link", source.link},
-                      {"line", source.line},
-                      {"turning_joint", source.turning},
-                      {"radius_from", source.radius_from},
-                      {"turns_backward", source.turns_backward},
-                      {"mu1", optional(source.mu1)},
-                      {"mu2", optional(source.mu2)}});
+    wheels.emplace_back(
+        FieldWriter::written(source_of(reading, wheel.name), [](auto& v, auto& row) {
+          FIELDS(joint, link, line, radius_from, turns_backward, mu1, mu2);
+          v.field("turning_joint", row.turning);
+        }));
+    wheels.back().update({{"name", wheel.name},
+                          {"kind", wheel_names()[static_cast<std::size_t>(wheel.kind)]},
+                          {"driven", wheel.driven},
+                          {"steered", wheel.steered},
+                          {"x", number_or_null(wheel.x_m)},
+                          {"y", number_or_null(wheel.y_m)},
+                          {"radius", number_or_null(wheel.radius_m)},
+                          {"width", number_or_null(wheel.width_m)},
+                          {"heading", wheel.heading_rad},
+                          {"load_n", loads.empty() ? json(nullptr) : json(loads[i])}});
   }
   const json out = {{"name", completed.name},
                     {"drive", drive_names()[static_cast<std::size_t>(completed.drive)]},
@@ -233,12 +227,12 @@ std::string describe_robot_json(const RobotReading& reading, const GroundRobot& 
                     {"base_link", reading.base_link},
                     {"origin_in_base_link",
                      {{"x", reading.X_BR.x}, {"y", reading.X_BR.y}, {"theta", reading.X_BR.theta}}},
-                    {"mass", optional(reading.robot.mass_kg)},
+                    {"mass", number_or_null(reading.robot.mass_kg)},
                     {"centre_of_mass",
-                     {{"x", optional(completed.com_x_m)},
-                      {"y", optional(completed.com_y_m)},
-                      {"z", optional(completed.com_z_m)}}},
-                    {"yaw_inertia", optional(reading.robot.yaw_inertia_kg_m2)},
+                     {{"x", number_or_null(completed.com_x_m)},
+                      {"y", number_or_null(completed.com_y_m)},
+                      {"z", number_or_null(completed.com_z_m)}}},
+                    {"yaw_inertia", number_or_null(reading.robot.yaw_inertia_kg_m2)},
                     {"wheels", wheels},
                     {"disagreements", reading.disagreements},
                     {"remarks", reading.remarks},
