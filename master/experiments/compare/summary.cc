@@ -172,6 +172,7 @@ void add_results(const ComparisonSummary& summary, PlainPage& page) {
     const auto [lower, upper] = summary.variants[v].success_95;
     table.rows[v].push_back(percent_text(lower) + " to " + percent_text(upper));
   }
+  for (TextTable::Row& row : table.rows) row.resize(table.head.size());
   page.table(table);
 }
 

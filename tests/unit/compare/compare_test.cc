@@ -149,6 +149,7 @@ TEST(Summary, CountsWhatTheTargetTook) {
   EXPECT_THAT(runs_csv(s, runs), HasSubstr("slow,3,100,2,\n"));
   const std::string page = comparison_page(s, "Test", {{"file", "<b>.toml"}});
   EXPECT_THAT(page, HasSubstr("fast &amp; &lt;good&gt;"));
+  EXPECT_THAT(page, HasSubstr("<td>nothing</td><td>-</td><td></td><td></td><td></td><td></td>"));
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_THAT(page, Not(HasSubstr("<b>.toml")));
 }
