@@ -21,6 +21,7 @@ constexpr double kSingularShare = 1e-14;
 // A dimension's spread is judged against at least this share of its magnitude.
 constexpr double kConstantShare = 1e-8;
 constexpr std::size_t kFinalists = 10;  // of the starts, run to convergence
+constexpr double kKept = 0.975;         // of chi-square, in the reweighted estimate
 
 struct Fit {
   Eigen::VectorXd mean;
@@ -92,12 +93,12 @@ class Concentration {
     return fit(std::move(order));
   }
 
-  // A random (p + 1)-subset, enlarged point by point while its covariance is singular.
+  // A random subset of 4, enlarged point by point while its covariance is singular.
   Fit random_start(Stream& stream) const {
     const auto n = static_cast<std::size_t>(points_.cols());
     std::vector<std::size_t> pool = indices(n);
     const auto draw = [&](std::size_t k) { std::swap(pool[k], pool[k + stream.below(n - k)]); };
-    auto size = static_cast<std::size_t>(points_.rows()) + 1;
+    auto size = std::size_t{4};
     for (std::size_t k = 0; k < size; ++k) draw(k);
     for (;; ++size) {
       Fit start = fit({pool.begin(), pool.begin() + static_cast<std::ptrdiff_t>(size)});
@@ -175,97 +176,52 @@ RobustEstimate plain_estimate(const Eigen::MatrixXd& points) {
   return result;
 }
 
-// The p-th root of the determinant of the uncorrected estimate at the normal averages about
+// The factor that makes the covariance of the share of points nearest to the mean that of all.
+double consistency(double share) {
+  const double q = chi_squared_quantile(3, share);
+  return share / chi_squared_below(5, q);
+}
+
+// The cube root of the determinant of the uncorrected estimate at the normal averages about
 // 1 - e^log / n^power (the form of Pison et al. 2002).
 struct Deficit {
   double log;
   double power;
   double share(double n) const { return 1 - std::exp(log) / std::pow(n, power); }
 };
-
-// Raw estimates: the coefficients of Pison et al.  For p > 2 they are fitted through the deficits
-// at n = 2 p^2 and n = 3 p^2, alpha / p^beta each.
-struct RawRow {
-  double alpha2, beta2, alpha3, beta3;  // p > 2
-  Deficit p2, p1;
+struct Deficits {
+  Deficit half, most;  // of a share of 0.5 and 0.875 in the half
 };
-constexpr RawRow kRaw500{1.42764571687802,
-                         1.26263336932151,
-                         1.06141115981725,
-                         1.28907991440387,
-                         {0.673292623522027, 0.691365864961895},
-                         {0.262024211897096, 0.604756680630497}};
-constexpr RawRow kRaw875{0.455179464070565,
-                         1.11192541278794,
-                         0.294241208320834,
-                         1.09649329149811,
-                         {0.446537815635445, 1.06690782995919},
-                         {-0.351584646688712, 1.01646567502486}};
 
-Deficit raw_deficit(const RawRow& row, int p) {
-  if (p == 1) return row.p1;
-  if (p == 2) return row.p2;
-  const double y2 = std::log(row.alpha2 / std::pow(p, row.beta2));
-  const double y3 = std::log(row.alpha3 / std::pow(p, row.beta3));
-  const double x2 = std::log(2.0 * p * p);
-  const double x3 = std::log(3.0 * p * p);
-  const double power = (y2 - y3) / (x3 - x2);
-  return {y2 + power * x2, power};
-}
+// Pison et al.'s in three dimensions.
+constexpr Deficits kRaw{{1.2890911601609358, 0.80273720974806839},
+                        {0.98062657691294097, 1.0342147173926575}};
+// Fitted to our own simulations (n of 16 to 160), because the published coefficients belong to a
+// consistency factor of the share of points kept, which grows with the outliers trimmed; ours is
+// that of the cut-off.
+constexpr Deficits kReweighted{{1.558318, 0.806987}, {1.199275, 0.942506}};
 
-// Reweighted estimates: fitted to our own simulations (n of 16 to 160), because the published
-// coefficients belong to a consistency factor of the share of points kept, which grows with the
-// outliers trimmed; ours is that of the cut-off.  Beyond p = 3 the deficit is taken at the same
-// n / p^2.
-constexpr Deficit kReweighted500[] = {
-    {0.461667, 0.864298}, {1.268960, 0.762936}, {1.558318, 0.806987}};
-constexpr Deficit kReweighted875[] = {
-    {-0.222813, 1.088279}, {0.822969, 0.921210}, {1.199275, 0.942506}};
-
-// Linear in the share of the half between 0.5, 0.875 and 1, as Pison et al. do.
-double small_sample(const Deficit& half, const Deficit& most, double n, double share) {
-  const double f500 = half.share(n);
-  const double f875 = most.share(n);
-  const double f = share <= 0.875 ? f500 + (f875 - f500) / 0.375 * (std::max(share, 0.5) - 0.5)
-                                  : f875 + (1 - f875) / 0.125 * (share - 0.875);
+// Linear in the share of the half, which is 0.75 at most, as Pison et al. do.
+double small_sample(const Deficits& deficits, double n, double share) {
+  const double f500 = deficits.half.share(n);
+  const double f875 = deficits.most.share(n);
+  const double f = f500 + (f875 - f500) / 0.375 * (share - 0.5);
   return 1 / std::max(f, 0.25);  // the fits leave their range for very few points
 }
 
 }  // namespace
 
-double mcd_consistency(double share, int p) {
-  if (share >= 1) return 1;
-  const double q = chi_squared_quantile(p, share);
-  return share / chi_squared_below(p + 2, q);
-}
-
-double mcd_small_sample_raw(std::size_t n, int p, double share) {
-  return small_sample(raw_deficit(kRaw500, p), raw_deficit(kRaw875, p), static_cast<double>(n),
-                      share);
-}
-
-double mcd_small_sample_reweighted(std::size_t n, int p, double share) {
-  const auto row = static_cast<std::size_t>(std::min(p, 3) - 1);
-  const double dimension = std::max(p, 3);
-  const double count =
-      p <= 3 ? static_cast<double>(n) : static_cast<double>(n) * 9 / (dimension * dimension);
-  return small_sample(kReweighted500[row], kReweighted875[row], count, share);
-}
-
 RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settings,
                         Stream& stream) {
-  assert(points.cols() > 0 && points.allFinite());
+  assert(points.rows() == 3 && points.cols() > 0 && points.allFinite());
   const auto n = static_cast<std::size_t>(points.cols());
-  const int p = static_cast<int>(points.rows());
-  const auto dimension = static_cast<std::size_t>(p);
-  if (n < 2 * (dimension + 1)) return plain_estimate(points);
-
-  const std::size_t half = (n + dimension + 1) / 2;
-  const std::size_t support = std::clamp(settings.support.value_or(half), half, n);
-  const double share = static_cast<double>(support) / static_cast<double>(n);
+  if (n < 8) return plain_estimate(points);
+  const std::size_t support = n / 2 + 2;  // of the greatest breakdown point
+  const auto count = static_cast<double>(n);
+  const double share = static_cast<double>(support) / count;
 
   RobustEstimate result;
-  Eigen::VectorXd ridge = Eigen::VectorXd::Zero(p);
+  Eigen::VectorXd ridge = Eigen::VectorXd::Zero(3);
   Fit fit = Concentration(points, support, ridge).search(settings, stream);
   if (fit.singular()) {
     result.outcome = McdOutcome::kSingular;
@@ -274,10 +230,10 @@ RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settin
     assert(!fit.singular());
   }
   result.raw_log_determinant = fit.log_determinant;
-  fit.covariance *= mcd_consistency(share, p) * mcd_small_sample_raw(n, p, share);
+  fit.covariance *= consistency(share) * small_sample(kRaw, count, share);
   result.raw_covariance = fit.covariance;
 
-  const double cutoff = chi_squared_quantile(p, settings.reweight_quantile);
+  const double cutoff = chi_squared_quantile(3, kKept);
   const Eigen::VectorXd distances = Concentration(points, support, ridge).distances(fit);
   result.weights.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -285,32 +241,25 @@ RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settin
   }
   MeanCovariance reweighted = weighted_mean_covariance(points, result.weights);
   result.mean = std::move(reweighted.mean);
-  result.covariance = reweighted.covariance * mcd_consistency(settings.reweight_quantile, p) *
-                      mcd_small_sample_reweighted(n, p, share);
+  result.covariance =
+      reweighted.covariance * consistency(kKept) * small_sample(kReweighted, count, share);
   result.covariance.diagonal() += ridge;
   result.support = std::move(fit.subset);
   return result;
 }
 
-CentredPoses centre_headings(std::span<const Pose> poses) {
-  std::vector<double> headings = mapped(poses, [](const Pose& pose) { return pose.theta; });
-  CentredPoses result;
-  result.reference_rad = circular_centre(headings);
-  result.vectors.resize(3, static_cast<Index>(poses.size()));
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    result.vectors.col(static_cast<Index>(i)) << poses[i].x, poses[i].y,
-        wrap_angle(poses[i].theta - result.reference_rad);
-  }
-  return result;
-}
-
 RobustPose robust_pose(std::span<const Pose> poses, const McdSettings& settings, Stream& stream) {
-  const CentredPoses centred = centre_headings(poses);
-  RobustEstimate estimate = fast_mcd(centred.vectors, settings, stream);
+  // Headings from the sample's circular centre, so that they do not wrap.
+  const double centre_rad = circular_centre(mapped(poses, &Pose::theta));
+  Eigen::MatrixXd vectors(3, static_cast<Index>(poses.size()));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    vectors.col(static_cast<Index>(i)) << poses[i].x, poses[i].y,
+        wrap_angle(poses[i].theta - centre_rad);
+  }
+  RobustEstimate estimate = fast_mcd(vectors, settings, stream);
   RobustPose result;
   result.outcome = estimate.outcome;
-  result.mean = {estimate.mean[0], estimate.mean[1],
-                 wrap_angle(centred.reference_rad + estimate.mean[2])};
+  result.mean = {estimate.mean[0], estimate.mean[1], wrap_angle(centre_rad + estimate.mean[2])};
   result.covariance = estimate.covariance;
   result.weights = std::move(estimate.weights);
   return result;

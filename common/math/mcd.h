@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,21 +12,17 @@
 namespace gapfarm {
 
 struct McdSettings {
-  // Points in the concentrated half; none: floor((n + p + 1) / 2), the greatest breakdown point.
-  // Clamped to [floor((n + p + 1) / 2), n].
-  std::optional<std::size_t> support = std::nullopt;
-  unsigned starts = 500;  // random (p + 1)-subsets, two C-steps each; the best of them go on
-  double reweight_quantile = 0.975;  // of chi-square with p degrees of freedom
+  unsigned starts = 500;  // random subsets of 4, two C-steps each; the best of them go on
 };
 
 enum class McdOutcome {
   kRegular,
-  // At least `support` points lie on a hyperplane (a constant column, coarse readings), so the
-  // least determinant is zero: to the diagonal of every covariance the square of the data's
+  // Half of the points lie on a plane (a constant column, coarse readings), so the least
+  // determinant is zero: to the diagonal of every covariance the square of the data's
   // resolution was added, the smallest step between two values of a dimension over sqrt(12), raised
   // to 1e-6 of its range, 1e-8 of its magnitude and 1e-9.
   kSingular,
-  // Fewer than 2 (p + 1) points: the plain mean and covariance, with the same added when
+  // Fewer than 8 points: the plain mean and covariance, with the same added when
   // singular; nothing was trimmed.
   kTooFew,
 };
@@ -38,31 +33,18 @@ struct RobustEstimate {
   // own simulations.  The covariance is symmetric positive definite.
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
-  // Of the concentrated half: consistent at the normal (c(h) = (h/n) / P(chi2_{p+2} < q_{h/n}),
+  // Of the concentrated half: consistent at the normal (c(h) = (h/n) / P(chi2_5 < q_{h/n}),
   // Croux and Haesbroeck 1999) and corrected for small samples (Pison, Van Aelst and Willems 2002).
   Eigen::MatrixXd raw_covariance;
   double raw_log_determinant = 0;    // of the uncorrected covariance of the half, ridge included
-  std::vector<std::size_t> support;  // indices of the half, ascending
+  std::vector<std::size_t> support;  // the half: floor(n / 2) + 2 indices, ascending
   std::vector<double> weights;       // 1: used in the reweighted estimate, 0: an outlier
 };
 
-// `points`: dimension x count, all finite, at least one point.  The same stream key gives the same
-// answer; subsets are drawn by index, so the estimate is affine equivariant.  One pass over all
-// points, without the nested partitions of the original: meant for up to some 10^4 points.
+// `points`: 3 x count, all finite, at least one point.  The same stream key gives the same answer;
+// subsets are drawn by index, so the estimate is affine equivariant.  One pass over all points,
+// without the nested partitions of the original: meant for up to some 10^4 points.
 RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settings, Stream& stream);
-
-// Factors of the two corrections, exposed for their tests.  REQUIRES: 0 < h <= n, p >= 1.
-double mcd_consistency(double share, int p);
-double mcd_small_sample_raw(std::size_t n, int p, double share);
-double mcd_small_sample_reweighted(std::size_t n, int p, double share);
-
-// Poses as vectors in which headings do not wrap: (x, y, theta - reference), the last wrapped about
-// the sample's circular centre.
-struct CentredPoses {
-  double reference_rad = 0;
-  Eigen::Matrix3Xd vectors;
-};
-CentredPoses centre_headings(std::span<const Pose> poses);
 
 // Robust mean pose and covariance (m^2, m rad, rad^2; axes of the poses' own frame).
 struct RobustPose {
