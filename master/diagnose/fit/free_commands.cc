@@ -171,24 +171,7 @@ Twist motion_of(const Study& study, std::size_t trial) {
 
 CarriedToEnd carried_to_end(const Study& study, std::size_t trial) {
   const ResidualTrial& t = study.trials[trial];
-  const Twist motion = motion_of(study, trial);
-  const int steps = 8 + static_cast<int>(4 * std::abs(motion[2]));
-  CarriedToEnd carried;
-  carried.rate.setZero();
-  Eigen::Vector2d rest = Eigen::Vector2d::Zero();  // of the way, from here to the end
-  for (int k = steps; k-- > 0;) {
-    const double behind = motion[2] * (1 - (k + 0.5) / steps);
-    Eigen::Matrix2d axes;  // the robot's here, seen from the end's
-    axes << std::cos(behind), std::sin(behind), -std::sin(behind), std::cos(behind);
-    const Eigen::Vector2d step = axes * motion.head<2>() / steps;
-    rest += step / 2;
-    carried.rate.topLeftCorner<2, 2>() += axes / steps;
-    carried.rate.topRightCorner<2, 1>() += Eigen::Vector2d(-rest.y(), rest.x()) / steps;
-    rest += step / 2;
-  }
-  carried.rate(2, 2) = 1;
-  carried.start = carry(between(t.X_WS, t.X_WP));
-  return carried;
+  return {end_slopes(motion_of(study, trial)), carry(between(t.X_WS, t.X_WP))};
 }
 
 // Sizes: those of nuisance.cc's cells, spread over the commands between.  How a tread turns at a

@@ -91,7 +91,7 @@ TEST(FreeCommands, DisturbancesAreCarriedToTheEnd) {
     for (int k = 0; k < 3; ++k) {
       const Twist d = kStep * Twist::Unit(k);
       const Pose pushed = t.X_WS * exp(Twist(twist_of(commands[i]) + d));
-      EXPECT_LT((local_difference(t.X_WP, pushed) / kStep - carried.rate.col(k)).norm(), 5e-3);
+      EXPECT_LT((local_difference(t.X_WP, pushed) / kStep - carried.rate.col(k)).norm(), 1e-4);
       const Pose shifted = t.X_WS * Pose{d[0], d[1], d[2]} * exp(twist_of(commands[i]));
       EXPECT_LT((local_difference(t.X_WP, shifted) / kStep - carried.start.col(k)).norm(), 1e-3);
     }
