@@ -18,7 +18,7 @@ constexpr auto kStamp = [](auto& v, auto& row) { FIELDS(command, problem, option
 Result<Provenance> read_stamp(const std::string& file) {
   ASSIGN_OR_RETURN(const auto text, read_text_file(file));
   const Json json = parse_json(text);
-  auto stamp = LenientFields::read<Provenance>(json, kStamp);
+  auto stamp = FieldReader::read<Provenance>(json, kStamp);
   if (stamp.problem.empty())
     return Error{file + ": does not say what was asked; choose another --out"};
   return stamp;

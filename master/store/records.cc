@@ -42,7 +42,7 @@ void read_farm(const std::string& text, Progress* progress) {
       progress->farm.*row.count = found->get<std::uint64_t>();
     }
   }
-  LenientFields(json).field("listen", progress->listen);
+  FieldReader(json).field("listen", progress->listen);
   progress->fleets = fleets_of(json.value("fleets", Json()));
 }
 
@@ -285,7 +285,7 @@ std::filesystem::path answer_file(const std::filesystem::path& folder) {
 Json to_json(const CommandRecord& record) { return FieldWriter::written(record, kRecord); }
 
 CommandRecord command_record_of(const Json& json) {
-  return LenientFields::read<CommandRecord>(json, kRecord);
+  return FieldReader::read<CommandRecord>(json, kRecord);
 }
 
 Json workers_json(const std::vector<WorkerStatus>& workers) {
@@ -293,7 +293,7 @@ Json workers_json(const std::vector<WorkerStatus>& workers) {
 }
 
 std::vector<WorkerStatus> workers_of(const Json& json) {
-  return LenientFields::list<WorkerStatus>(json, kWorker);
+  return FieldReader::rows<WorkerStatus>(json, kWorker);
 }
 
 Json fleets_json(const std::vector<FleetStatus>& fleets) {
@@ -301,7 +301,7 @@ Json fleets_json(const std::vector<FleetStatus>& fleets) {
 }
 
 std::vector<FleetStatus> fleets_of(const Json& json) {
-  return LenientFields::list<FleetStatus>(json, kFleet);
+  return FieldReader::rows<FleetStatus>(json, kFleet);
 }
 
 Result<std::optional<CommandRecord>> command_status(const std::filesystem::path& folder,

@@ -4,10 +4,26 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/ranges.h"
-#include "master/diagnose/result/json_fields.h"
+#include "common/json/fields.h"
+#include "common/json/matrix.h"
 #include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm {
+
+static void to_json(Json& json, const PathSample& s) {
+  json = {s.t_s, s.pose.x, s.pose.y, s.pose.theta};
+}
+
+template <>
+struct FieldForm<PathSample> {
+  using Written = std::vector<double>;
+  static const char* set(const Written& v, PathSample& to) {
+    if (v.size() != 4) return "[t s, x m, y m, heading rad]";
+    to = {v[0], {v[1], v[2], v[3]}};
+    return nullptr;
+  }
+};
+
 namespace {
 
 constexpr int kVersion = 1;
@@ -180,18 +196,18 @@ Json residual_json(const FoundResidual& residual) {
 Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
   std::string error;
   FoundResidual found;
-  Fields fields(json, "residual", error);
+  FieldReader fields(json, "residual", &error);
   kFound(fields, found);
   fields.list("terms", found.correction.field, kTerm);
   if (json.contains("strays")) {
-    Fields outliers(json["strays"], "residual.strays", error);
+    FieldReader outliers(json["strays"], "residual.strays", &error);
     kOutliers(outliers, found.correction.outliers.emplace());
     outliers.field("chances", found.chances);
     const auto is_chance = [](double chance) { return chance >= 0 && chance <= 1; };
     if (!std::ranges::all_of(found.chances, is_chance))
       outliers.complain("chances", found.chances, "numbers in [0, 1]");
   }
-  if (!error.empty()) return Error{error};
+  if (!error.empty()) return Error{"diagnosis.json: " + error};
   std::vector<std::string> commands;
   for (ResidualTerm& term : found.correction.field) {
     for (ResidualWeights& w : term.weights) {
@@ -250,7 +266,7 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   const Json json = parse_json(text);
   if (json.is_discarded()) return Error{"diagnosis.json: not JSON; is the file complete?"};
   std::string error;
-  Fields root(json, "", error);
+  FieldReader root(json, "", &error);
   double version = 0;
   root.field("version", version);
   if (error.empty() && version != kVersion) {
@@ -264,11 +280,13 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   if (error.empty() && known == nullptr) {
     root.complain("verdict", json["verdict"], "effect, none, unknown, effect+unknown or unusable");
   }
-  if (!error.empty()) return Error{error};
+  if (!error.empty()) {
+    return Error{"diagnosis.json: " + error + "; was this written by gapfarm diagnose?"};
+  }
   diagnosis.verdict = known->first;
   kDiagnosis(root, diagnosis);
   kLast(root, diagnosis);
-  if (!error.empty()) return Error{error};
+  if (!error.empty()) return Error{"diagnosis.json: " + error};
   if (json.contains("residual")) {
     if (Status s = read_residual(json["residual"], &diagnosis.residual); !s) return s.error();
   }

@@ -4,9 +4,9 @@
 #include <type_traits>
 
 #include "common/base/text.h"
+#include "common/json/fields.h"
 #include "common/json/json.h"
 #include "master/diagnose/result/diagnosis_json.h"
-#include "master/diagnose/result/json_fields.h"
 
 namespace gapfarm {
 namespace {
@@ -101,13 +101,13 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
     trial.covariates.resize(shown.size());
     std::size_t column = 0;
     std::string error;
-    Fields cells(table, where, error);
+    FieldReader cells(table, where, &error);
     const auto read = [&](const std::string& name, auto& field) {
       cells.cell(name, row[column++], field);
     };
     visit_columns(trial, read);
     for (std::size_t k = 0; k < shown.size(); ++k) read(shown[k].key, trial.covariates[k]);
-    if (!error.empty()) return Error{error};
+    if (!error.empty()) return Error{"diagnosis.json: " + error};
     for (Eigen::Matrix3d* cov : {&trial.tuned_cov, &trial.final_cov}) {
       cov->triangularView<Eigen::StrictlyLower>() = cov->transpose();
     }

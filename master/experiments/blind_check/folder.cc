@@ -219,7 +219,7 @@ Result<CheckState> read_check_state(const std::string& path) {
   if (!json.is_object() || !json.value("asked", Json()).is_string()) {
     return Error{path + ": is not the state of a blind check; choose another --out"};
   }
-  return LenientFields::read<CheckState>(json, kCheckState);
+  return FieldReader::read<CheckState>(json, kCheckState);
 }
 
 Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& paths,
@@ -257,7 +257,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
 ChildEnd read_outcome(const std::string& path) {
   const Result<std::string> text = read_text_file(path);
   const Json json = text ? parse_json(*text) : Json();
-  auto end = LenientFields::read<ChildEnd>(json, kChildEnd);
+  auto end = FieldReader::read<ChildEnd>(json, kChildEnd);
   if (!json.is_object()) {
     end.state = ChildState::kFailed;
     end.text = "has no outcome";

@@ -12,7 +12,7 @@ namespace {
 std::optional<std::vector<double>> numbers(const Json& line, const char* key) {
   if (!line.is_object() || !line.contains(key)) return {};
   std::vector<double> all;
-  LenientFields(line).field(key, all);
+  FieldReader(line).field(key, all);
   return all;
 }
 

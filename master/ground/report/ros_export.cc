@@ -259,7 +259,7 @@ Result<ReportedValues> parse_values(const std::string& text, const std::string& 
   ReportedValues values;
   std::string robot;
   if (json.is_object()) {
-    const LenientFields fields(json);
+    FieldReader fields(json);
     fields.field("robot", robot);
     fields.field("logs", values.logs);
     fields.field("folder", values.folder);

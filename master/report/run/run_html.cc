@@ -6,9 +6,9 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/json/fields.h"
 #include "common/json/json.h"
 #include "master/diagnose/result/diagnosis_json.h"
-#include "master/diagnose/result/json_fields.h"
 #include "master/report/figures/figures.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -245,10 +245,10 @@ Result<RunOutcome> parse_run_outcome(const std::string& text) {
   }
   RunOutcome outcome;
   std::string error;
-  Fields root(json, "", error);
+  FieldReader root(json, "", &error);
   root.list("validation", outcome.validation, kScore);
   root.list("baselines", outcome.baselines, kScore);
-  if (!error.empty()) return Error{error};
+  if (!error.empty()) return Error{"the run's outcome: " + error};
   ASSIGN_OR_RETURN(outcome.trials, parse_trials(json["trials"], {}));
   return outcome;
 }

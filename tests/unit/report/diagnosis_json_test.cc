@@ -5,7 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
 
+#include "common/json/fields.h"
 #include "tests/unit/report/example_diagnosis.h"
 
 namespace gapfarm::diagnosis_json_test {
@@ -151,6 +154,26 @@ TEST(DiagnosisJson, KeepsTheShapeOfWhatHasNoName) {
   EXPECT_THAT(parse_diagnosis(json.dump()).error().message, HasSubstr("lost"));
   json["residual"] = 3;
   EXPECT_THAT(parse_diagnosis(json.dump()).error().message, HasSubstr("residual"));
+}
+
+TEST(FieldReader, IsStrictWhereItMayReportWhatIsWrong) {
+  struct Row {
+    double value = 1;
+    std::uint64_t count = 2;
+    std::optional<double> maybe;
+  };
+  const auto describe = [](auto& v, auto& row) { FIELDS(value, count, maybe); };
+  const Json json = {{"value", nullptr}, {"count", 3.5}, {"maybe", "x"}};
+  const Row lenient = FieldReader::read<Row>(json, describe);
+  EXPECT_EQ(lenient.value, 1);
+  EXPECT_EQ(lenient.count, 3U);
+  EXPECT_FALSE(lenient.maybe);
+  Row strict;
+  std::string error;
+  FieldReader fields(json, "row", &error);
+  describe(fields, strict);
+  EXPECT_TRUE(std::isnan(strict.value));
+  EXPECT_EQ(error, "row.count is 3.5, expected a count");
 }
 
 // A file cut off anywhere, or with any byte gone wrong, is refused or read; it never crashes.

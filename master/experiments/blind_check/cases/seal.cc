@@ -114,7 +114,7 @@ Result<Truth> parse_truth(const std::string& text, const std::string& file, cons
   if (answer == "effect" && effects.empty()) return wrong(file, "\"effects\" is empty");
   Truth truth;
   truth.id = id;
-  const LenientFields fields(json);
+  FieldReader fields(json);
   fields.field("case", truth.id);
   fields.field("level", truth.level);
   fields.field("left_out", truth.excluded);
@@ -125,7 +125,7 @@ Result<Truth> parse_truth(const std::string& text, const std::string& file, cons
     for (const auto& [key, value] : parameters.items()) {
       if (const auto number = parameter_value(name, key, value)) effect.parameters[key] = *number;
     }
-    LenientFields(sizes).field(name.c_str(), effect.size);
+    FieldReader(sizes).field(name, effect.size);
     truth.effects.push_back(std::move(effect));
   }
   fields.field("seed", truth.seed);
@@ -189,7 +189,7 @@ std::string format_sealed(const std::vector<SealedTruth>& truths) {
 Result<std::vector<SealedTruth>> parse_sealed(const std::string& text, const std::string& file) {
   const Json json = parse_json(text);
   if (!json.is_array()) return Error{file + ": holds no truths of a blind check"};
-  return mapped(json, [](const Json& t) { return LenientFields::read<SealedTruth>(t, kSealed); });
+  return mapped(json, [](const Json& t) { return FieldReader::read<SealedTruth>(t, kSealed); });
 }
 
 PrivateMemory::PrivateMemory() : before_(::prctl(PR_GET_DUMPABLE)) { ::prctl(PR_SET_DUMPABLE, 0); }
