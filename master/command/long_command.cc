@@ -39,11 +39,11 @@ std::string state_folder() {
   return {};
 }
 
-// What a command that ended so is, for status and --on-end: "finished", "stopped" or "failed".
-std::string state_of_exit(int exit_code) {
-  if (exit_code == kExitDone || exit_code == kExitQuarantined) return "finished";
-  if (exit_code == kExitResumable || exit_code > kExitSignalBase) return "stopped";
-  return "failed";
+// What a command that ended so is, for status and --on-end.
+RunState state_of_exit(int exit_code) {
+  if (exit_code == kExitDone || exit_code == kExitQuarantined) return RunState::kFinished;
+  const bool stopped = exit_code == kExitResumable || exit_code > kExitSignalBase;
+  return stopped ? RunState::kStopped : RunState::kFailed;
 }
 
 std::string value_of(const CLI::App& command, const std::string& name) {
@@ -154,7 +154,7 @@ LongCommand::LongCommand(std::string command, std::vector<ProgressStage> stages,
     : console_(console), progress_(std::move(stages)) {
   record_.command = std::move(command);
   record_.arguments = command_line();
-  record_.state = "running";
+  record_.state = RunState::kRunning;
   record_.began_unix_s = unix_now_s();
   record_.pid = ::getpid();
   record_.host = host_name();
@@ -238,7 +238,7 @@ void LongCommand::write_record() {
   if (!keeps()) return;
   written_s_ = monotonic_seconds();
   static_cast<ProgressView&>(record_) = progress_.at(written_s_);
-  if (record_.state == "finished") record_.share = 1;
+  if (record_.state == RunState::kFinished) record_.share = 1;
   record_.heartbeat_unix_s = unix_now_s();
   // A courtesy: the command goes on when it cannot be written.
   const auto text = json_text(to_json(record_));
@@ -272,11 +272,11 @@ void LongCommand::end(int exit_code) {
                               answer_file(place_.folder).string()));
   }
   record_.state = state_of_exit(exit_code);
-  record_.reason = record_.state == "stopped" ? "stopped by request"
-                   : record_.state == "failed"
-                       ? "failed with exit code " + std::to_string(exit_code)
-                       : "";
-  if (place_.passing && (record_.state == "finished" || holds_nothing())) {
+  record_.stop_reason = record_.state == RunState::kStopped ? "stopped by request"
+                        : record_.state == RunState::kFailed
+                            ? "failed with exit code " + std::to_string(exit_code)
+                            : "";
+  if (place_.passing && (record_.state == RunState::kFinished || holds_nothing())) {
     answers_.reset();
     lock_.reset();
     std::error_code ignored;
@@ -285,7 +285,7 @@ void LongCommand::end(int exit_code) {
     fs::remove(place_.folder, ignored);  // unless somebody put something there
     return;
   }
-  if (place_.forget && record_.state == "finished") {
+  if (place_.forget && record_.state == RunState::kFinished) {
     if (Status s = answers_->forget(); !s) console_.error(s.error());
   }
   write_record();
@@ -312,7 +312,7 @@ void conclude_command(const CLI::App& command, int exit_code, CliContext& contex
   if (text.empty() || is_dry_run(command)) return;
   const auto status =
       run_shell(text, {"GAPFARM_COMMAND=" + command.get_name(), "GAPFARM_OUT=" + out_of(command),
-                       "GAPFARM_STATE=" + state_of_exit(exit_code),
+                       std::string("GAPFARM_STATE=") + run_state_name(state_of_exit(exit_code)),
                        "GAPFARM_EXIT=" + std::to_string(exit_code)});
   if (!status) {
     context.console.error(under("--on-end", status).error());

@@ -180,21 +180,20 @@ void add_facts(const RunStatus& status, RunFarm* farm) {
   const auto add = [&](const std::string& label, const std::string& value) {
     farm->facts.emplace_back(label, value);
   };
-  const Progress& progress = status.progress;
   if (const std::string start = search_start_text(status.info); !start.empty()) {
     add("began at", start);
   }
   add("evaluations", std::to_string(status.last.evaluations));
-  if (status.state == RunState::kRunning) {
+  if (status.running()) {
     add("rate", fmt::format("{:.3g} evaluations/s", status.rate_per_s));
-    add("tasks of this generation", fmt::format("{} of {}", progress.done, progress.total));
+    add("tasks of this generation", fmt::format("{} of {}", status.done, status.total));
     if (status.time_left_s) add("time left", "about " + format_duration(*status.time_left_s));
   }
-  add("last heard of", day_and_time(progress.heartbeat_unix_s) + " on " + progress.host);
-  if (progress.epoch > 1) add("masters so far", std::to_string(progress.epoch));
+  add("last heard of", day_and_time(status.heartbeat_unix_s) + " on " + status.host);
+  if (status.epoch > 1) add("masters so far", std::to_string(status.epoch));
   if (status.quarantined > 0) add("tasks given up", std::to_string(status.quarantined));
   for (const FarmTally::Row& row : FarmTally::kRows) {
-    farm->tally.emplace_back(row.label, std::to_string(progress.farm.*row.count));
+    farm->tally.emplace_back(row.label, std::to_string(status.farm.*row.count));
   }
 }
 
@@ -323,10 +322,9 @@ Status add_farm(const RunReader& reader, RunReport* report) {
   ASSIGN_OR_RETURN(const auto status, run_status(reader, unix_now_s()));
   RunFarm& farm = report->farm;
   farm.state = run_state_name(status.state);
-  const bool running = status.state == RunState::kRunning;
-  farm.message = running ? status.progress.waiting : status.stop_reason;
+  farm.message = status.running() ? status.waiting : status.stop_reason;
   add_facts(status, &farm);
-  RETURN_IF_ERROR(add_workers(reader, running, &farm));
+  RETURN_IF_ERROR(add_workers(reader, status.running(), &farm));
   farm.facts.emplace_back("wall time", format_duration(status.wall_s));
   if (farm.timeline.worker_s > 0) {
     farm.facts.emplace_back("all workers' time together", format_duration(farm.timeline.worker_s));

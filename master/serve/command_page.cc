@@ -19,7 +19,7 @@ std::string command_tiles(const CommandRecord& r) {
   const auto tile_of = [](const char* title, const std::string& value, const std::string& small) {
     return html_tile(title, "", value, "", "<small>" + small + "</small>");
   };
-  const bool running = r.state == "running";
+  const bool running = r.running();
   const bool simulates = r.simulated + r.remembered > 0;
   std::string html = R"(<dl class="tiles" id="tiles" data-live>)";
   html += tile_of("Done", percent_text(r.share), bar_svg(r.share, "fill-named"));
@@ -72,7 +72,7 @@ std::string finding_html(const Finding& found) {
 std::string stage_text(const CommandRecord& r, std::size_t k) {
   const double began_s = r.plan[k].began_unix_s;
   const bool last = k + 1 >= r.number;
-  if (k + 1 > r.number) return r.state == "running" ? "to come" : "not reached";
+  if (k + 1 > r.number) return r.running() ? "to come" : "not reached";
   if (began_s == 0) return "not needed";
   double ended_s = r.heartbeat_unix_s;
   for (std::size_t j = k + 1; j < r.plan.size() && !last; ++j) {
@@ -81,15 +81,15 @@ std::string stage_text(const CommandRecord& r, std::size_t k) {
     break;
   }
   const std::string took = format_duration(std::max(0.0, ended_s - began_s));
-  if (!last || r.state == "finished") return "done in " + took;
-  return r.state == "running" ? "at work, for " + took : r.state + " after " + took;
+  if (!last || r.state == RunState::kFinished) return "done in " + took;
+  return r.running() ? "at work, for " + took : run_state_name(r.state) + (" after " + took);
 }
 
 // The stages in their order, each with what was found in it.
 std::string findings_list(const CommandRecord& r) {
   std::string html = R"(<ol class="stages">)";
   for (std::size_t k = 0; k < r.plan.size(); ++k) {
-    const bool now = r.state == "running" && k + 1 == r.number;
+    const bool now = r.running() && k + 1 == r.number;
     html +=
         fmt::format(R"(<li{}><h3>{} <small>{}</small></h3>)", now ? R"( aria-current="step")" : "",
                     html_escaped(r.plan[k].name), stage_text(r, k));
@@ -113,7 +113,7 @@ std::string found_section(const CommandRecord& r) {
 std::string stages_section(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
   std::vector<HtmlRow> rows;
   for (const AnsweredStage& stage : stages) {
-    const bool now = r.state == "running" && stage.name == r.stage;
+    const bool now = r.running() && stage.name == r.stage;
     rows.push_back({html_escaped(stage.name),
                     {number_text(static_cast<double>(stage.answers), 9),
                      now ? R"(<span class="tag">now</span>)" : ""}});
@@ -128,9 +128,8 @@ std::string stages_section(const CommandRecord& r, const std::vector<AnsweredSta
 std::string workers_section(const CommandRecord& r) {
   const auto workers = mapped(r.workers, [](const WorkerStatus& w) { return RunWorker{w, ""}; });
   return R"(<section id="workers"><h2>Workers</h2><div id="worker-table" data-live>)" +
-         worker_table(workers, r.state == "running"
-                                   ? "No worker has been heard of."
-                                   : "The command has ended, and with it its workers.") +
+         worker_table(workers, r.running() ? "No worker has been heard of."
+                                           : "The command has ended, and with it its workers.") +
          "</div></section>\n";
 }
 
@@ -156,16 +155,16 @@ Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
   const bool is_diagnosis = r.command == "diagnose";
   PageFrame frame;
   frame.served = true;
-  frame.title = r.command + " " + r.state + ": " + found.name;
+  frame.title = r.command + " " + run_state_name(r.state) + ": " + found.name;
   frame.brand = r.command.empty() ? "simulations" : r.command;
   frame.places = {{"summary", "State"}};
   if (is_diagnosis) frame.places.emplace_back("found", "Found so far");
   frame.places.insert(frame.places.end(), {{"stages", "Simulations"}, {"workers", "Workers"}});
   const std::string message =
-      r.state == "running" ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
+      r.running() ? (r.waiting.empty() ? r.stage : r.waiting) : r.stop_reason;
   frame.body = fmt::format(
       R"(<section id="summary"><div id="now" data-live><p class="verdict verdict-none">{}</p><h1 data-file="{}">{}</h1><p>{}</p></div>{}</section>)",
-      html_escaped(r.state.empty() ? "unknown" : r.state), html_escaped(r.command),
+      r.state == RunState::kUnknown ? "unknown" : run_state_name(r.state), html_escaped(r.command),
       html_escaped(message.empty() ? found.name : message), html_escaped(r.arguments),
       command_tiles(r));
   if (is_diagnosis) frame.body += found_section(r);

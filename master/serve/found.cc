@@ -69,21 +69,11 @@ std::size_t trials_of(const RunInfo& info) {
                                                : 0;
 }
 
-void count_workers(const std::vector<WorkerStatus>& workers, bool running, WorkEntry* entry) {
-  if (!running) return;
-  for (const WorkerStatus& worker : workers) {
-    ++entry->workers_by_state[worker.state];
-    entry->workers += worker.state != "gone" ? 1 : 0;
-  }
-}
-
 Status read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(found.path));
   ASSIGN_OR_RETURN(const auto status, run_status(reader, now_unix_s));
-  const Progress& progress = status.progress;
-  entry->state = run_state_name(status.state);
-  const bool running = status.state == RunState::kRunning;
-  entry->status_text = running ? progress.waiting : status.stop_reason;
+  static_cast<LiveStatus&>(*entry) = status;
+  entry->status_text = status.running() ? status.waiting : status.stop_reason;
   entry->fitness = status.info.fitness;
   entry->unit = status.info.fitness_unit;
   entry->higher_is_better = status.info.higher_is_better;
@@ -99,14 +89,8 @@ Status read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
   entry->trials = trials_of(status.info);
   entry->seed = status.info.seed;
   entry->config = status.info.config_path;
-  entry->rate_per_s = running ? status.rate_per_s : 0;
-  entry->time_left_s = running ? status.time_left_s : std::nullopt;
   entry->given_up = status.quarantined;
-  entry->farm = progress.farm;
-  entry->tasks = running ? progress.total : 0;
-  entry->tasks_done = running ? progress.done : 0;
-  entry->changed_unix_s = progress.heartbeat_unix_s;
-  count_workers(progress.workers, running, entry);
+  entry->farm = status.farm;
   return {};
 }
 
@@ -114,18 +98,10 @@ Status read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* ent
   ASSIGN_OR_RETURN(const auto record, command_status(found.path, now_unix_s));
   if (!record) return {};
   const CommandRecord& r = *record;
-  const bool running = r.state == "running";
+  static_cast<LiveStatus&>(*entry) = r;
   entry->what = r.command.empty() ? entry->what : r.command;
-  entry->state = r.state;
-  entry->status_text = running ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
+  entry->status_text = r.running() ? (r.waiting.empty() ? r.stage : r.waiting) : r.stop_reason;
   entry->config = r.arguments;
-  entry->share = r.share;
-  entry->rate_per_s = running ? r.rate_per_s : 0;
-  entry->time_left_s = running ? r.time_left_s : std::nullopt;
-  entry->changed_unix_s = r.heartbeat_unix_s;
-  entry->tasks = running ? r.total : 0;
-  entry->tasks_done = running ? r.done : 0;
-  count_workers(r.workers, running, entry);
   return {};
 }
 
@@ -138,7 +114,7 @@ void read_headline(const FoundWork& found, WorkEntry* entry) {
   if (json.contains("headline") && json["headline"].is_string()) {
     entry->status_text = json["headline"].get<std::string>();
   }
-  if (entry->state.empty()) entry->state = "finished";
+  if (entry->state == RunState::kUnknown) entry->state = RunState::kFinished;
 }
 
 // Never fails: what cannot be read says so in `trouble`.
@@ -153,7 +129,7 @@ WorkEntry entry_of(const FoundWork& found, double now_unix_s) {
   const Status read =
       run ? read_run(found, now_unix_s, &entry) : read_command_of(found, now_unix_s, &entry);
   if (!read) entry.trouble = read.error().message;
-  if (found.kind == FoundWork::Kind::kDiagnosis && entry.state != "running") {
+  if (found.kind == FoundWork::Kind::kDiagnosis && !entry.running()) {
     read_headline(found, &entry);
   }
   return entry;
@@ -185,7 +161,7 @@ bool WorkEntries::holds(const Known& known, const std::string& stamp, double now
   const double age_s = now_unix_s - known.read_unix_s;
   if (age_s < 0) return false;
   if (age_s < good_for_s(known.cost_s)) return true;
-  const bool may_change = known.entry.state == "running" || !known.entry.trouble.empty();
+  const bool may_change = known.entry.running() || !known.entry.trouble.empty();
   return known.entry.stamp == stamp && (!may_change || age_s < kLookAgain_s);
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string_view>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -39,17 +40,24 @@ std::string spark(const WorkEntry& entry) {
          d + R"("/></svg>)";
 }
 
+std::size_t in_state(const WorkEntry& e, std::string_view state) {
+  return static_cast<std::size_t>(std::ranges::count(e.workers, state, &WorkerStatus::state));
+}
+
 std::string state_text(const WorkEntry& e) {
   if (!e.trouble.empty()) {
     return R"(<span class="warning">cannot be read</span><small>)" + html_escaped(e.trouble) +
            "</small>";
   }
-  std::string text = fmt::format(R"(<strong class="state-{}">{}</strong>)", e.state, e.state);
-  if (e.share && e.state == "running") text += " " + percent_text(*e.share);
-  if (e.time_left_s) text += ", about " + format_duration(*e.time_left_s) + " left";
-  if (e.state == "running")
-    text += fmt::format(", {} worker{}", e.workers, e.workers == 1 ? "" : "s");
-  if (e.rate_per_s > 0) text += ", " + number_text(e.rate_per_s) + "/s";
+  std::string text =
+      fmt::format(R"(<strong class="state-{0}">{0}</strong>)", run_state_name(e.state));
+  if (e.running()) {
+    if (e.kind != FoundWork::Kind::kRun) text += " " + percent_text(e.share);
+    if (e.time_left_s) text += ", about " + format_duration(*e.time_left_s) + " left";
+    const std::size_t there = e.workers.size() - in_state(e, "gone");
+    text += fmt::format(", {} worker{}", there, there == 1 ? "" : "s");
+    if (e.rate_per_s > 0) text += ", " + number_text(e.rate_per_s) + "/s";
+  }
   if (e.farm.alarms + e.given_up > 0) {
     text += fmt::format(R"( <span class="warning">▲ {} given up, {} alarms</span>)", e.given_up,
                         e.farm.alarms);
@@ -85,7 +93,7 @@ HtmlRow row_of_entry(const WorkEntry& e) {
   return {head,
           {state_text(e), best, spark(e), extent, run ? std::to_string(e.trials) : "",
            run ? std::to_string(e.seed) : "", "<small>" + html_escaped(e.config) + "</small>",
-           e.changed_unix_s > 0 ? utc_text(e.changed_unix_s, "%Y-%m-%d %H:%M UTC") : "–"}};
+           e.heartbeat_unix_s > 0 ? utc_text(e.heartbeat_unix_s, "%Y-%m-%d %H:%M UTC") : "–"}};
 }
 
 std::string list_address(const ListView& view, const std::string& sort) {
@@ -119,7 +127,9 @@ std::string work_table(const std::vector<WorkEntry>& entries, const ListView& vi
 void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
   const auto before = [&](const WorkEntry& a, const WorkEntry& b) {
     if (sort == "name") return a.name < b.name;
-    if (sort == "state") return a.state > b.state;
+    if (sort == "state") {
+      return std::string_view(run_state_name(a.state)) > run_state_name(b.state);
+    }
     // Of different fitnesses there is no better one.
     if (sort == "best" && a.fitness != b.fitness) return a.fitness > b.fitness;
     if (sort == "best" && a.best && b.best) {
@@ -129,13 +139,13 @@ void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
     if (sort == "trials") return a.trials > b.trials;
     if (sort == "seed") return a.seed < b.seed;
     if (sort == "config") return a.config < b.config;
-    return a.changed_unix_s > b.changed_unix_s;
+    return a.heartbeat_unix_s > b.heartbeat_unix_s;
   };
   std::stable_sort(entries->begin(), entries->end(), before);
 }
 
 bool is_wanted(const WorkEntry& e, const ListView& view) {
-  if (!view.state.empty() && e.state != view.state) return false;
+  if (!view.state.empty() && run_state_name(e.state) != view.state) return false;
   const std::string all = lowered(e.name + " " + e.what + " " + e.config + " " + e.status_text +
                                   " seed " + std::to_string(e.seed));
   std::istringstream terms(lowered(view.query));
@@ -191,7 +201,7 @@ std::string comparison_table(std::span<const RunReport> runs) {
 std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
                       const std::vector<std::string>& folders) {
   const std::size_t all = entries.size();
-  const auto running = std::ranges::count(entries, "running", &WorkEntry::state);
+  const auto running = std::ranges::count(entries, RunState::kRunning, &WorkEntry::state);
   std::erase_if(entries, [&](const WorkEntry& e) { return !is_wanted(e, view); });
   sort_entries(&entries, view.sort);
   PageFrame frame;
@@ -309,35 +319,40 @@ constexpr auto kCounter = MetricsPage::kCounter;
 
 constexpr MetricRow kMetricRows[] = {
     {"running", kGauge, "1 while its process lives.",
-     [](const WorkEntry& e, double) -> Metric { return e.state == "running" ? 1 : 0; }},
+     [](const WorkEntry& e, double) -> Metric { return e.running() ? 1 : 0; }},
     {"heartbeat_age_seconds", kGauge, "Since its process was last heard of.",
-     [](const WorkEntry& e, double now_unix_s) -> Metric { return now_unix_s - e.changed_unix_s; }},
+     [](const WorkEntry& e, double now_unix_s) -> Metric {
+       return now_unix_s - e.heartbeat_unix_s;
+     }},
     {"generation", kGauge, "Generations committed.",
      [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.generation); }},
     {"evaluations_total", kCounter, "Evaluations committed, since the run began.",
      [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.evaluations); }},
     {"evaluations_per_second", kGauge, "Of a command that is no run: simulations.",
-     [](const WorkEntry& e, double) -> Metric { return e.rate_per_s; }},
+     [](const WorkEntry& e, double) -> Metric { return e.running() ? e.rate_per_s : 0; }},
     {"tasks", kGauge, "Tasks of the generation or stage under way.",
-     [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.tasks); }},
+     [](const WorkEntry& e, double) -> Metric {
+       return static_cast<double>(e.running() ? e.total : 0);
+     }},
     {"tasks_done", kGauge, "Those of them that are answered.",
-     [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.tasks_done); }},
+     [](const WorkEntry& e, double) -> Metric {
+       return static_cast<double>(e.running() ? e.done : 0);
+     }},
     {"quarantined_total", kCounter, "Tasks that were given up.",
      [](const WorkEntry& e, double) -> Metric { return static_cast<double>(e.given_up); }},
     {"best_fitness", kGauge, "In its own sense and unit.",
      [](const WorkEntry& e, double) { return e.best; }},
     {"time_left_seconds", kGauge, "Until it is done.",
-     [](const WorkEntry& e, double) { return e.time_left_s; }},
+     [](const WorkEntry& e, double) { return e.running() ? e.time_left_s : Metric(); }},
 };
 
 void add_farms(const std::vector<WorkEntry>& entries, MetricsPage* page) {
   for (const char* state : {"busy", "idle", "gone"}) {
     for (const WorkEntry& e : entries) {
       if (!e.trouble.empty()) continue;
-      const auto count = e.workers_by_state.find(state);
       page->add("workers", kGauge, "Workers by state.",
                 MetricsPage::label("of", e.name) + "," + MetricsPage::label("state", state),
-                count == e.workers_by_state.end() ? 0 : count->second);
+                static_cast<double>(in_state(e, state)));
     }
   }
   for (const FarmTally::Row& row : FarmTally::kRows) {

@@ -29,7 +29,7 @@ HttpResponse unchanged(const std::string& etag) {
 
 // What a page says of itself changes with its folder and with whether its process lives.
 std::string tokens_of(const WorkEntry& entry) {
-  return entry.stamp + entry.state + "|" + entry.status_text + "|";
+  return entry.stamp + run_state_name(entry.state) + "|" + entry.status_text + "|";
 }
 
 std::optional<std::uint64_t> whole_number(const std::string& text) {
@@ -114,7 +114,7 @@ Result<Site::Standing> Site::standing(const Target& target) const {
   if (target.path == "/") {
     for (const WorkEntry& e : entries_) {
       now.tag += e.name + tokens_of(e);
-      now.state += e.name + e.state + "|";
+      now.state += e.name + run_state_name(e.state) + "|";
     }
   } else {
     const auto names = target.query.find("of");
@@ -123,7 +123,7 @@ Result<Site::Standing> Site::standing(const Target& target) const {
       const FoundWork* found = find(name);
       if (found == nullptr) return Error{no_such(name)};
       now.tag += tokens_of(entry(*found));
-      now.state += entry(*found).state + "|";
+      now.state += run_state_name(entry(*found).state) + std::string("|");
     }
   }
   now.tag = hash_of(now.tag + key_of(target));
@@ -226,7 +226,7 @@ Result<std::string> Site::view(const Target& target) const {
     report.served = true;
     return run_html(report);
   }
-  if (found->kind == FoundWork::Kind::kDiagnosis && entry(*found).state != "running") {
+  if (found->kind == FoundWork::Kind::kDiagnosis && !entry(*found).running()) {
     ASSIGN_OR_RETURN(const auto text, read_text_file((found->path / "diagnosis.json").string()));
     const auto diagnosis = parse_diagnosis(text);
     if (!diagnosis) return Error{found->name + ": " + diagnosis.error().message};

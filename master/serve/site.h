@@ -35,11 +35,10 @@ std::vector<FoundWork> find_work(const std::vector<std::filesystem::path>& roots
 std::string stamp_of(const std::filesystem::path& folder);
 
 // One line of the list.
-struct WorkEntry {
+struct WorkEntry : LiveStatus {
   FoundWork::Kind kind = FoundWork::Kind::kRun;
   std::string name;
   std::string what;         // "run", "diagnosis", "compare"
-  std::string state;        // "running", "finished", "stopped", "failed"
   std::string status_text;  // the headline, why it stopped or what it waits for
   std::string fitness, unit;
   bool higher_is_better = true;
@@ -49,17 +48,10 @@ struct WorkEntry {
   std::size_t trials = 0;
   std::uint64_t seed = 0;
   std::string config;
-  double rate_per_s = 0;
-  std::optional<double> time_left_s;
-  std::optional<double> share;              // of a command, [0, 1]
-  std::size_t workers = 0;                  // that are there
-  std::uint64_t given_up = 0;               // tasks
-  std::uint64_t tasks = 0, tasks_done = 0;  // of the generation or stage under way
-  std::map<std::string, unsigned> workers_by_state;
-  FarmTally farm;  // of a run, over all its masters
-  double changed_unix_s = 0;
-  std::string trouble;  // why it cannot be read
-  std::string stamp;    // stamp_of() its folder, when it was read
+  std::uint64_t given_up = 0;  // tasks
+  FarmTally farm;              // of a run, over all its masters
+  std::string trouble;         // why it cannot be read
+  std::string stamp;           // stamp_of() its folder, when it was read
 };
 
 // How long what took so much CPU time to work out is good for: work is a hundredth of the time.

@@ -16,8 +16,20 @@
 namespace gapfarm {
 
 const char* run_state_name(RunState state) {
-  constexpr const char* kNames[] = {"running", "finished", "stopped"};
+  constexpr const char* kNames[] = {"", "running", "finished", "stopped", "failed"};
   return kNames[static_cast<std::size_t>(state)];
+}
+
+namespace {
+
+constexpr RunState kRunStates[] = {RunState::kRunning, RunState::kFinished, RunState::kStopped,
+                                   RunState::kFailed};
+
+}  // namespace
+
+RunState run_state_of(const std::string& name) {
+  const auto* found = std::ranges::find(kRunStates, name, run_state_name);
+  return found == std::end(kRunStates) ? RunState::kUnknown : *found;
 }
 
 Json to_json(const FarmTally& tally) {
@@ -233,9 +245,9 @@ constexpr auto kFleet = [](auto& v, auto& row) {
   FIELDS(queued, running, lost, why);
 };
 constexpr auto kRecord = [](auto& v, auto& row) {
-  FIELDS(command, state);
-  v.field("stop_reason", row.reason);
-  FIELDS(stage);
+  FIELDS(command);
+  v.choice("state", row.state, kRunStates, run_state_name);
+  FIELDS(stop_reason, stage);
   v.field("stage_number", row.number);
   FIELDS(stages);
   v.list("plan", row.plan, kStage);
@@ -274,8 +286,16 @@ void LiveStatus::leave() {
   listen.clear();
 }
 
-std::string LiveStatus::gone_text() const {
-  return "crashed: process " + std::to_string(pid) + " on " + host + " is gone without a word";
+void LiveStatus::judge(bool lives) {
+  if (running() && lives) return;
+  if (running()) {
+    state = RunState::kStopped;
+    stop_reason =
+        "crashed: process " + std::to_string(pid) + " on " + host + " is gone without a word";
+  }
+  time_left_s.reset();
+  if (state == RunState::kFinished) time_left_s = 0;
+  leave();
 }
 
 std::filesystem::path answer_file(const std::filesystem::path& folder) {
@@ -314,15 +334,7 @@ Result<std::optional<CommandRecord>> command_status(const std::filesystem::path&
   if (!text) return std::optional<CommandRecord>();
   CommandRecord record = command_record_of(parse_json(*text));
   const double age_s = now_unix_s - record.heartbeat_unix_s;
-  if (record.state == "running" && !holder_lives(folder, record.host, age_s, kFreshRecord_s)) {
-    record.state = "stopped";
-    record.reason = record.gone_text();
-  }
-  if (record.state != "running") {
-    record.time_left_s.reset();
-    if (record.state == "finished") record.time_left_s = 0;
-    record.leave();
-  }
+  record.judge(holder_lives(folder, record.host, age_s, kFreshRecord_s));
   return std::optional<CommandRecord>(std::move(record));
 }
 

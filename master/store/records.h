@@ -65,8 +65,9 @@ struct StoredGeneration {
   std::string digest;  // set by the store; covers all generations up to this one
 };
 
-enum class RunState { kRunning, kFinished, kStopped };
-const char* run_state_name(RunState state);
+enum class RunState { kUnknown, kRunning, kFinished, kStopped, kFailed };  // kFailed: no runs
+const char* run_state_name(RunState state);                                // "", "running", ...
+RunState run_state_of(const std::string& name);  // kUnknown for what is none of them
 
 enum class IncidentKind {
   kQuarantine,  // a task was given up: it ended too many workers
@@ -99,8 +100,10 @@ struct StoredDocument {
 };
 
 // What whoever works, a run's master or another long command, last reported of itself and its farm.
-struct LiveStatus {
-  std::string waiting;  // what it waits for; empty: nothing
+struct LiveStatus : ProgressView {  // of a run: tasks of the generation in work, no stages
+  RunState state = RunState::kUnknown;
+  std::string stop_reason;  // how it ended; empty while it runs
+  std::string waiting;      // what it waits for; empty: nothing
   std::vector<WorkerStatus> workers;
   std::vector<FleetStatus> fleets;
   std::string listen;  // for workers: the first tcp:// endpoint; empty: none
@@ -113,17 +116,16 @@ struct LiveStatus {
   bool look_at(const Farm& farm, WorkerWait& wait, double now_s);
   // Without a farm there is nobody to wait for.
   void leave();
-  // Why it is over, of one whose process has gone.
-  std::string gone_text() const;
+  bool running() const { return state == RunState::kRunning; }
+  // One that says it runs but whose process is gone has stopped, with the reason; what is over has
+  // no farm and promises nothing.
+  void judge(bool lives);
 };
 
 // The live part: what a running master last reported about itself.
 struct Progress : LiveStatus {
-  RunState state = RunState::kRunning;
-  std::string stop_reason;  // empty while running
-  double rate_per_s = 0;    // evaluations
-  std::optional<double> time_left_s;
-  std::uint64_t done = 0, total = 0;  // tasks of the generation in work
+  Progress() { state = RunState::kRunning; }
+
   FarmTally farm;
   // Set by the store, with process, host and heartbeat:
   std::uint64_t epoch = 0;  // masters that have written to this run, this one included
@@ -158,11 +160,9 @@ struct StageFinding {
   Finding found;
 };
 
-struct CommandRecord : ProgressView, LiveStatus {
+struct CommandRecord : LiveStatus {
   std::string command;                 // "diagnose"
   std::string arguments;               // the whole command line
-  std::string state;                   // "running", "finished", "stopped", "failed"
-  std::string reason;                  // how it ended; empty while it runs
   std::vector<StageRecord> plan;       // all stages in their order
   std::vector<StageFinding> findings;  // so far, in the order in which they came
   double began_unix_s = 0;
@@ -172,8 +172,8 @@ Json to_json(const CommandRecord& record);
 // Fields that are missing or of another kind are left as they are by default.
 CommandRecord command_record_of(const Json& json);
 
-// What the command in `folder` last reported; one that says it runs but whose process is gone has
-// stopped, with the reason.  None: the folder holds no command.  Errors: of reading its file.
+// What the command in `folder` last reported, as it is judged to stand.  None: the folder holds no
+// command.  Errors: of reading its file.
 Result<std::optional<CommandRecord>> command_status(const std::filesystem::path& folder,
                                                     double now_unix_s);
 

@@ -21,13 +21,6 @@ std::vector<double> genome_of(const std::string& blob) {
   return genome;
 }
 
-RunState state_of(const std::string& name) {
-  for (const RunState state : {RunState::kRunning, RunState::kFinished}) {
-    if (name == run_state_name(state)) return state;
-  }
-  return RunState::kStopped;
-}
-
 // Of member_columns(), the first being column `at`.
 StoredIndividual individual_of(const SqlStatement& row, int at) {
   StoredIndividual individual;
@@ -71,11 +64,10 @@ StoredGeneration generation_of(const SqlStatement& row) {
 // Masters beat about once a second; thirty missed ones are more than a slow disk.
 constexpr double kFreshHeartbeat_s = 30;
 
-bool master_lives(const RunReader& reader, const Progress& progress, double heartbeat_age_s) {
-  if (progress.state != RunState::kRunning) return false;
+bool master_lives(const RunReader& reader, const std::string& host, double heartbeat_age_s) {
   // A kept copy of a store has no master of its own.
   if (!std::filesystem::is_directory(reader.run())) return false;
-  return holder_lives(reader.run(), progress.host, heartbeat_age_s, kFreshHeartbeat_s);
+  return holder_lives(reader.run(), host, heartbeat_age_s, kFreshHeartbeat_s);
 }
 
 Json to_json(const Incident& incident) {
@@ -219,8 +211,8 @@ Result<Progress> RunReader::progress() const {
                       std::string state, reason, workers, farm;
                       row.read_all(state, reason, p.pid, p.host, p.heartbeat_unix_s, p.rate_per_s,
                                    p.time_left_s, p.done, p.total, workers, p.epoch, farm);
-                      p.state = state_of(state);
-                      (p.state == RunState::kRunning ? p.waiting : p.stop_reason) = reason;
+                      p.state = run_state_of(state);
+                      (p.running() ? p.waiting : p.stop_reason) = reason;
                       p.workers = workers_of(parse_json(workers));
                       read_farm(farm, &p);
                       return p;
@@ -231,8 +223,8 @@ Result<Progress> RunReader::progress() const {
 Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
   RunStatus status;
   status.info = reader.info();
-  ASSIGN_OR_RETURN(status.progress, reader.progress());
-  status.heartbeat_age_s = now_unix_s - status.progress.heartbeat_unix_s;
+  ASSIGN_OR_RETURN(static_cast<Progress&>(status), reader.progress());
+  status.heartbeat_age_s = now_unix_s - status.heartbeat_unix_s;
 
   ASSIGN_OR_RETURN(const std::vector<StoredGeneration> generations, reader.generations());
   for (const StoredGeneration& generation : generations) {
@@ -253,22 +245,10 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
 
   ASSIGN_OR_RETURN(status.front, run_front(reader, generations));
 
-  status.state = status.progress.state;
-  status.stop_reason = status.progress.stop_reason;
-  if (status.state == RunState::kRunning &&
-      !master_lives(reader, status.progress, status.heartbeat_age_s)) {
-    status.state = RunState::kStopped;
-    status.stop_reason = status.progress.gone_text();
-  }
-  if (status.state == RunState::kRunning) {
-    status.rate_per_s = status.progress.rate_per_s;
-    status.time_left_s = status.progress.time_left_s;
-  } else {
-    // Of a run that is over, what it did on the whole.
+  status.judge(master_lives(reader, status.host, status.heartbeat_age_s));
+  if (!status.running()) {
     const double evaluations = static_cast<double>(status.last.evaluations);
     status.rate_per_s = status.wall_s > 0 ? evaluations / status.wall_s : 0;
-    if (status.state == RunState::kFinished) status.time_left_s = 0;
-    status.progress.leave();
   }
   return status;
 }
@@ -301,7 +281,7 @@ Json to_json(const RunStatus& status) {
   Json json;
   json["state"] = run_state_name(status.state);
   json["stop_reason"] = status.stop_reason;
-  json["waiting"] = status.state == RunState::kRunning ? status.progress.waiting : "";
+  json["waiting"] = status.waiting;
   json["generation"] = status.last.generation;
   json["evaluations"] = status.last.evaluations;
   json["best_fitness"] = number_or_null(status.last.best);
@@ -310,12 +290,12 @@ Json to_json(const RunStatus& status) {
   json["rate_per_s"] = status.rate_per_s;
   json["time_left_s"] = number_or_null(status.time_left_s);
   json["digest"] = status.last.digest;
-  json["workers"] = workers_json(status.progress.workers);
+  json["workers"] = workers_json(status.workers);
   json["quarantined"] = status.quarantined;
   Json& incidents = json["incidents"] = Json::array();
   for (const Incident& incident : status.incidents) incidents.push_back(to_json(incident));
-  json["farm"] = to_json(status.progress.farm);
-  json["fleets"] = fleets_json(status.progress.fleets);
+  json["farm"] = to_json(status.farm);
+  json["fleets"] = fleets_json(status.fleets);
   json["fitness"] = status.info.fitness;
   json["fitness_unit"] = status.info.fitness_unit;
   json["higher_is_better"] = status.info.higher_is_better;
@@ -332,7 +312,7 @@ Json to_json(const RunStatus& status) {
     start.erase("spread");
     json["start"] = std::move(start);
   }
-  json["epoch"] = status.progress.epoch;
+  json["epoch"] = status.epoch;
   json["heartbeat_age_s"] = status.heartbeat_age_s;
   if (!status.front.objectives.empty()) json["front"] = to_json(status.front);
   if (status.best_individual) {

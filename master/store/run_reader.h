@@ -83,16 +83,12 @@ Result<RunFront> run_front(const RunReader& reader,
 Json values_json(const StoredIndividual& member);
 Json to_json(const RunFront& front);
 
-struct RunStatus {
-  RunState state = RunState::kStopped;
-  std::string stop_reason;  // "" while running; "crashed: ..." when the master just went
-  StoredGeneration last;    // committed, without its members; number 0: none
-  double wall_s = 0;        // spent on committed generations
-  double rate_per_s = 0;
-  std::optional<double> time_left_s;
+// Of a run that is over, the rate is that of all it did.
+struct RunStatus : Progress {
+  StoredGeneration last;            // committed, without its members; number 0: none
+  double wall_s = 0;                // spent on committed generations
   std::uint64_t quarantined = 0;    // tasks given up, with those of the generation in work
   std::vector<Incident> incidents;  // in the order in which they happened
-  Progress progress;
   double heartbeat_age_s = 0;
   std::vector<std::optional<double>> best_by_generation;
   std::optional<StoredIndividual> best_individual;

@@ -254,7 +254,7 @@ Status RunStore::set_numeric_class(const std::string& numeric_class) {
 
 Status RunStore::set_progress(const Progress& progress) {
   // One column for both: a run that waits has not stopped.
-  const bool running = progress.state == RunState::kRunning;
+  const bool running = progress.running();
   FarmTally farm = farm_before_;
   farm += progress.farm;
   return database_.run(

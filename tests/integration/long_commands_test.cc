@@ -44,7 +44,7 @@ class LongCommands : public ::testing::Test {
     const auto left = record(kept);
     EXPECT_TRUE(left);
     if (left) {
-      EXPECT_EQ(left->state, "stopped");
+      EXPECT_EQ(left->state, RunState::kStopped);
       EXPECT_GT(left->share, 0);
       EXPECT_LT(left->share, 1);
     }
@@ -66,7 +66,7 @@ TEST_F(LongCommands, ComparisonsGoOn) {
                                     "2",       "--evaluations", "40",    "--workers",   "1"};
   };
   stop_and_go_on(arguments("compared"), folder_ / "compared");
-  EXPECT_EQ(record(folder_ / "compared")->state, "finished");
+  EXPECT_EQ(record(folder_ / "compared")->state, RunState::kFinished);
   ASSERT_EQ(gapfarm_command(arguments("undisturbed")).exit_code, 0);
   EXPECT_EQ(text_of(folder_ / "compared/convergence.csv"),
             text_of(folder_ / "undisturbed/convergence.csv"));
@@ -159,7 +159,7 @@ TEST_F(LongCommands, StudiesOfPathsGoOnAndForgetThePaths) {
   const std::string config = GAPFARM_SOURCE_DIR "/configs/racquetball_stability.toml";
   const std::string out = folder_ / "stable";
   stop_and_go_on({"stability", config, "--out", out, "--evaluations", "60", "--workers", "1"}, out);
-  EXPECT_EQ(record(out)->state, "finished");
+  EXPECT_EQ(record(out)->state, RunState::kFinished);
   EXPECT_LT(std::filesystem::file_size(out + "/simulations.sqlite"), 100000u);
 }
 

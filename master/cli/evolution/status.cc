@@ -26,13 +26,14 @@ constexpr std::size_t kMostOfAKind = 4;  // incidents
 class Screen {
  public:
   Screen(const Console& console, const std::string& folder, const std::string& what,
-         const std::string& state, const std::string& why)
+         const LiveStatus& live)
       : console_(console) {
-    const char* style = state == "running"    ? "1;32"
-                        : state == "finished" ? "1;34"
-                        : state == "failed"   ? "1;31"
-                                              : "1;33";
-    text_ = styled(folder, "1") + "  " + what + styled(state, style) +
+    const char* style = live.running()                      ? "1;32"
+                        : live.state == RunState::kFinished ? "1;34"
+                        : live.state == RunState::kFailed   ? "1;31"
+                                                            : "1;33";
+    const std::string& why = live.running() ? live.waiting : live.stop_reason;
+    text_ = styled(folder, "1") + "  " + what + styled(run_state_name(live.state), style) +
             (why.empty() ? "" : ": " + printable(why)) + "\n";
   }
 
@@ -69,18 +70,21 @@ void show_best(const RunStatus& status, Screen& screen) {
   }
 }
 
-void show_workers(const std::vector<WorkerStatus>& workers, const std::vector<FleetStatus>& fleets,
-                  Screen& screen) {
+void show_workers(const LiveStatus& live, double heartbeat_age_s, Screen& screen) {
+  const std::vector<WorkerStatus>& workers = live.workers;
   for (std::size_t i = 0; i < std::min(workers.size(), kMostWorkers); ++i) {
     const WorkerStatus& w = workers[i];
     screen.line(i == 0 ? "workers" : "", "{} on {}: {}, {} in hand, {} done{}", printable(w.name),
                 printable(w.host), printable(w.state), w.jobs, w.finished, rate_text(w.rate_per_s));
   }
   if (workers.size() > kMostWorkers) screen.more(workers.size() - kMostWorkers);
-  for (const FleetStatus& f : fleets) {
+  for (const FleetStatus& f : live.fleets) {
     screen.line("cluster", "{}: {} workers asked for, {} queued, {} running, {} lost{}",
                 printable(f.system), f.wanted, f.queued, f.running, f.lost,
                 f.why.empty() ? "" : "; " + printable(f.why));
+  }
+  if (live.running() && heartbeat_age_s > 5) {
+    screen.line("heartbeat", "{} ago", format_duration(heartbeat_age_s));
   }
 }
 
@@ -115,7 +119,7 @@ void show_incidents(const std::vector<const Incident*>& all, Screen& screen) {
 }
 
 void show_trouble(const RunStatus& status, Screen& screen) {
-  show_farm(status.progress.farm, screen);
+  show_farm(status.farm, screen);
   if (status.quarantined > 0) {
     screen.line("given up", "{} task{}", status.quarantined, status.quarantined == 1 ? "" : "s");
     show_incidents(of_kind(status, IncidentKind::kQuarantine), screen);
@@ -149,19 +153,13 @@ void show_front(const RunFront& front, Screen& screen) {
   screen.line("hypervolume", "{}", format_number(front.hypervolume.back()));
 }
 
-void show_heartbeat(bool running, double age_s, Screen& screen) {
-  if (running && age_s > 5) screen.line("heartbeat", "{} ago", format_duration(age_s));
-}
-
 std::string status_screen(const RunStatus& status, const std::string& run, const Console& console) {
-  const bool running = status.state == RunState::kRunning;
-  const Progress& progress = status.progress;
+  const bool running = status.running();
   const RunInfo& info = status.info;
-  Screen screen(console, run, "", run_state_name(status.state),
-                running ? progress.waiting : status.stop_reason);
+  Screen screen(console, run, "", status);
   screen.line("generation", "{}{}", status.last.generation,
-              running && progress.total > 0
-                  ? fmt::format(", and {} of {} tasks of the next", progress.done, progress.total)
+              running && status.total > 0
+                  ? fmt::format(", and {} of {} tasks of the next", status.done, status.total)
                   : "");
   screen.line("evaluations", "{}{}{}", status.last.evaluations, rate_text(status.rate_per_s),
               !running             ? ", in " + format_duration(status.wall_s)
@@ -181,8 +179,7 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
   }
   show_front(status.front, screen);
   show_best(status, screen);
-  show_workers(progress.workers, progress.fleets, screen);
-  show_heartbeat(running, status.heartbeat_age_s, screen);
+  show_workers(status, status.heartbeat_age_s, screen);
   show_trouble(status, screen);
   if (const std::string start = search_start_text(info); !start.empty()) {
     screen.line("began at", "{}", printable(start));
@@ -197,9 +194,8 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
 // About a diagnosis, a comparison or a study in `folder`.
 std::string command_screen(const CommandRecord& record, const std::string& folder,
                            double now_unix_s, const Console& console) {
-  const bool running = record.state == "running", over = record.state == "finished";
-  Screen screen(console, folder, printable(record.command) + " ", record.state,
-                running ? record.waiting : record.reason);
+  const bool running = record.running(), over = record.state == RunState::kFinished;
+  Screen screen(console, folder, printable(record.command) + " ", record);
   if (!over && record.number > 0) {
     screen.line("stage", "{} of {}: {}{}", record.number, record.stages, printable(record.stage),
                 record.total > 0 ? fmt::format(", {} of {}", record.done, record.total) : "");
@@ -218,9 +214,9 @@ std::string command_screen(const CommandRecord& record, const std::string& folde
   for (const auto& [stage, found] : record.findings) {
     screen.line("so far", "{}", printable(found.text));
   }
-  show_workers(record.workers, record.fleets, screen);
-  show_heartbeat(running, now_unix_s - record.heartbeat_unix_s, screen);
-  if (record.state == "stopped") screen.line("go on with", "{}", printable(record.arguments));
+  show_workers(record, now_unix_s - record.heartbeat_unix_s, screen);
+  if (record.state == RunState::kStopped)
+    screen.line("go on with", "{}", printable(record.arguments));
   return screen.text();
 }
 
@@ -250,13 +246,12 @@ Result<Look> look(const std::string& run, const Console& console) {
     ASSIGN_OR_RETURN(const auto record, command_status(command_folder(run), now_s));
     if (record) {
       return Look{to_json(*record), command_screen(*record, run, now_s, console),
-                  record->state == "running"};
+                  record->running()};
     }
   }
   ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(run));
   ASSIGN_OR_RETURN(const RunStatus status, run_status(reader, now_s));
-  return Look{to_json(status), status_screen(status, run, console),
-              status.state == RunState::kRunning};
+  return Look{to_json(status), status_screen(status, run, console), status.running()};
 }
 
 void show(const Look& seen, const StatusOptions& options, Console& console) {

@@ -31,21 +31,18 @@ Result<std::string> endpoint_of(const WorkersCommand& command) {
   const std::string& folder = command.run;
   if (folder.empty()) return command.connect;
   ASSIGN_OR_RETURN(const auto other, command_status(folder, unix_now_s()));
-  if (other && other->state == "running" && !other->listen.empty()) {
-    return reachable(other->listen, other->host);
-  }
+  LiveStatus live;
   if (other) {
-    return Error{folder + ": no master of it listens for workers now; run " + other->command +
-                 " with --listen tcp://*:5555"};
+    live = *other;
+  } else {
+    ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(folder));
+    ASSIGN_OR_RETURN(live, reader.progress());
   }
-  ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(folder));
-  ASSIGN_OR_RETURN(const Progress progress, reader.progress());
-  if (progress.state == RunState::kRunning && !progress.listen.empty()) {
-    return reachable(progress.listen, progress.host);
-  }
-  const std::string more = progress.state == RunState::kFinished ? " --generations N" : "";
-  return Error{folder + ": no master of it listens for workers now; `gapfarm resume " +
-               shell_quoted(folder) + more +
+  if (live.running() && !live.listen.empty()) return reachable(live.listen, live.host);
+  const std::string error = folder + ": no master of it listens for workers now; ";
+  if (other) return Error{error + "run " + other->command + " with --listen tcp://*:5555"};
+  const std::string more = live.state == RunState::kFinished ? " --generations N" : "";
+  return Error{error + "`gapfarm resume " + shell_quoted(folder) + more +
                " --listen tcp://*:5555`, or let it bring them itself with --workers-on"};
 }
 

@@ -144,7 +144,7 @@ TEST_F(SiteTest, ADiagnosisAtWorkReportsWhatItHasFound) {
   ASSERT_TRUE(answers.ok()) << answers.error().message;
   CommandRecord record;
   record.command = "diagnose";
-  record.state = "stopped";
+  record.state = RunState::kStopped;
   record.stage = "screen";
   record.number = 2, record.stages = 3;
   record.plan = {{"tune", 1e9 - 40}, {"screen", 1e9 - 30}, {"refit", 0}};

@@ -19,7 +19,7 @@ class CommandRecordTest : public StoreTest {
     CommandRecord record;
     record.command = "compare";
     record.arguments = "gapfarm compare a.toml --out compared";
-    record.state = "running";
+    record.state = RunState::kRunning;
     record.stage = "evaluate";
     record.number = record.stages = 1;
     record.done = 10;
@@ -77,8 +77,8 @@ TEST_F(CommandRecordTest, ADeadOneIsStoppedAndPromisesNothing) {
   write(example());
   const auto record = command_status(folder_, 1e6);
   ASSERT_TRUE(record.ok() && *record);
-  EXPECT_EQ((*record)->state, "stopped");
-  EXPECT_THAT((*record)->reason, HasSubstr("crashed: process 7"));
+  EXPECT_EQ((*record)->state, RunState::kStopped);
+  EXPECT_THAT((*record)->stop_reason, HasSubstr("crashed: process 7"));
   EXPECT_FALSE((*record)->time_left_s);
   EXPECT_TRUE((*record)->workers.empty());
   EXPECT_EQ((*record)->share, 0.25);
@@ -88,8 +88,8 @@ TEST_F(CommandRecordTest, OfAnotherHostTheHeartbeatDecides) {
   CommandRecord record = example();
   record.host = "elsewhere";
   write(record);
-  EXPECT_EQ((*command_status(folder_, 1010))->state, "running");
-  EXPECT_EQ((*command_status(folder_, 2000))->state, "stopped");
+  EXPECT_EQ((*command_status(folder_, 1010))->state, RunState::kRunning);
+  EXPECT_EQ((*command_status(folder_, 2000))->state, RunState::kStopped);
 }
 
 TEST_F(CommandRecordTest, FoldersWithoutACommandHaveNone) {

@@ -39,8 +39,8 @@ TEST_F(RunStatusTest, IsRunningWhileTheMasterHoldsTheLock) {
   EXPECT_EQ(now.state, RunState::kRunning);
   EXPECT_EQ(now.rate_per_s, 210);
   EXPECT_EQ(now.time_left_s, 12);
-  ASSERT_EQ(now.progress.workers.size(), 1u);
-  EXPECT_EQ(now.progress.workers[0].finished, 40u);
+  ASSERT_EQ(now.workers.size(), 1u);
+  EXPECT_EQ(now.workers[0].finished, 40u);
 }
 
 TEST_F(RunStatusTest, ReportsACrashFromAnEnd) {
