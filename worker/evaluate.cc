@@ -99,7 +99,6 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::E
   v1::TaskResult result;
   result.set_outcome(v1::OK);
   *result.mutable_evaluate() = *fitness;
-  result.set_simulated(prediction.simulated_s);
   return result;
 }
 
@@ -130,7 +129,6 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   if (prediction.outcome != v1::OK) return failed_task(prediction.outcome, prediction.message);
   v1::TaskResult result;
   result.set_outcome(v1::OK);
-  result.set_simulated(prediction.simulated_s);
   const TailedDensity density(prediction.tails);
   for (std::size_t k = 0; k < prediction.trials.size(); ++k) {
     const std::uint32_t i =

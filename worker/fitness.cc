@@ -151,7 +151,6 @@ Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessRefer
     case FitnessKind::kLogScore: {
       ASSIGN_OR_RETURN(const auto score, mean_log_score(problem, prediction));
       result.set_fitness(score);
-      result.set_log_score(score);
       break;
     }
     case FitnessKind::kEnergyScore: {
@@ -168,8 +167,6 @@ Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessRefer
     case FitnessKind::kRobustMahalanobis: {
       ASSIGN_OR_RETURN(const auto score, robust_score(problem, reference, prediction));
       result.set_fitness(score.fitness);
-      result.set_robust_distance(score.distance);
-      result.set_penalty(score.penalty);
       break;
     }
   }

@@ -95,7 +95,7 @@ void describe(CLI::App& app, Arguments* arguments) {
   app.add_flag("--process", arguments->process)->group("");
   app.add_option("--replaces", arguments->session.replaces)->group("");
   app.add_option("--replaced-end", arguments->session.replaced_end)
-      ->check(CLI::Range(0, int{v1::ProcessEnd_MAX}))
+      ->check(CLI::Range(0, static_cast<int>(EndCause::kStuck)))
       ->group("");
   app.add_option("--replaced-epoch", arguments->session.replaced_epoch)->group("");
   app.add_option("--replaced-attempt", arguments->session.replaced_attempt)->group("");
@@ -127,7 +127,6 @@ int work(const Arguments& arguments) {
   ServiceOptions options = arguments;
   options.security = std::move(*security);
   options.session.host = host_name();
-  options.session.pid = getpid();
   options.session.fingerprint = build_info().fingerprint;
   options.session.numeric_class = numeric_class();
   if (arguments.lifetime_s > 0) {

@@ -99,7 +99,6 @@ class Service {
     for (v1::JobResult& result : evaluation_.take_finished()) {
       session_.on_finished(std::move(result));
     }
-    session_.set_current_job_age(evaluation_.current_job_age());
     session_.on_tick(now);
     for (const AttemptKey& key : evaluation_.drop(session_.take_cancelled())) {
       session_.on_dropped(key);
@@ -250,7 +249,7 @@ void EvaluationThread::run() {
     if (stop_) return;
     const Work work = std::move(queue_.front());
     queue_.pop_front();
-    begun_ = monotonic_seconds();
+    working_ = true;
     lock.unlock();
     // In this order: an attempt is never seen with another's epoch.
     progress_.epoch.store(work.job.epoch());
@@ -261,7 +260,7 @@ void EvaluationThread::run() {
     }
     progress_.attempt.store(0);
     lock.lock();
-    begun_ = -1;
+    working_ = false;
     const bool later = result.wall() < kShort_s && finished_.size() + 1 < queue_.size();
     finished_.push_back(std::move(result));
     if (!later) notify();
@@ -318,12 +317,7 @@ std::vector<v1::JobResult> EvaluationThread::take_finished() {
 
 bool EvaluationThread::idle() {
   const std::lock_guard lock(mutex_);
-  return begun_ < 0 && queue_.empty() && finished_.empty();
-}
-
-double EvaluationThread::current_job_age() {
-  const std::lock_guard lock(mutex_);
-  return begun_ < 0 ? 0 : monotonic_seconds() - begun_;
+  return !working_ && queue_.empty() && finished_.empty();
 }
 
 }  // namespace gapfarm

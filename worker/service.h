@@ -37,7 +37,6 @@ class EvaluationThread {
   // while more of them are still to come.
   int fd() const { return fd_; }
   bool idle();
-  double current_job_age();  // s; 0: idle
 
  private:
   void run();
@@ -50,7 +49,7 @@ class EvaluationThread {
   std::condition_variable wake_;
   std::deque<Work> queue_;
   std::vector<v1::JobResult> finished_;
-  double begun_ = -1;  // s; negative: idle
+  bool working_ = false;
   bool notified_ = false;
   bool stop_ = false;
   std::thread thread_;  // last: it uses the rest

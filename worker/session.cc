@@ -39,9 +39,6 @@ void WorkerSession::on_message(v1::Envelope* envelope, double now) {
     case v1::Envelope::kHelloRequest:
       greet(now);
       break;
-    case v1::Envelope::kJob:
-      on_job(envelope->mutable_job());
-      break;
     case v1::Envelope::kBatch:
       for (v1::Job& job : *envelope->mutable_batch()->mutable_jobs()) on_job(&job);
       break;
@@ -174,7 +171,6 @@ void WorkerSession::answer_unknown(const std::string& hash) {
 void WorkerSession::on_finished(v1::JobResult result) {
   longest_wall_ = std::max(longest_wall_, result.wall());
   if (result.epoch() == epoch_ && in_hand_.count(result.attempt_id()) != 0) {
-    ++finished_;
     results_.push_back(std::move(result));
     return;
   }
@@ -210,10 +206,6 @@ void WorkerSession::on_tick(double now) {
   if (epoch_ == 0 || now < next_heartbeat_) return;
   next_heartbeat_ = now + heartbeat_interval_;
   v1::Heartbeat* heartbeat = outbox_.emplace_back().mutable_heartbeat();
-  heartbeat->set_sequence(++sequence_);
-  heartbeat->set_jobs_in_hand(static_cast<std::uint32_t>(in_hand_.size()));
-  heartbeat->set_finished(finished_);
-  heartbeat->set_current_job_age(current_job_age_);
   heartbeat->set_epoch(epoch_);
   heartbeat->set_leaving(leaving_ != Leaving::kNo);
   for (const auto& [attempt, job] : in_hand_) heartbeat->add_attempts(attempt);
@@ -226,7 +218,6 @@ void WorkerSession::greet(double now) {
   v1::Hello* hello = outbox_.emplace_back().mutable_hello();
   hello->set_name(options_.name);
   hello->set_host(options_.host);
-  hello->set_pid(options_.pid);
   hello->set_fingerprint(options_.fingerprint);
   hello->set_numeric_class(options_.numeric_class);
   hello->set_window(options_.window);
@@ -264,7 +255,6 @@ void WorkerSession::keep(const std::string& question, v1::JobResult* result) {
   v1::Offer::Answer& answer = kept_.emplace_back();
   answer.set_question(question);
   answer.mutable_result()->Swap(result->mutable_result());
-  answer.set_wall(result->wall());
   if (kept_.size() > kAnswersKept) kept_.pop_front();
 }
 

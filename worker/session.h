@@ -19,12 +19,11 @@ namespace gapfarm {
 struct SessionOptions {
   std::string name;  // unique among all workers of a master
   std::string host;
-  std::int64_t pid = 0;
   std::string fingerprint;
   std::string numeric_class;
-  unsigned window = 0;   // jobs wanted in hand; 0: as the master likes
-  std::string replaces;  // the process that this one makes up for, or empty
-  v1::ProcessEnd replaced_end = v1::PROCESS_LEFT;
+  unsigned window = 0;             // jobs wanted in hand; 0: as the master likes
+  std::string replaces;            // the process that this one makes up for, or empty
+  std::uint32_t replaced_end = 0;  // EndCause
   // What that process had in work; attempt 0: nothing.
   std::uint64_t replaced_epoch = 0;
   std::uint64_t replaced_attempt = 0;
@@ -99,7 +98,6 @@ class WorkerSession {
   bool over() const { return over_; }
   std::size_t in_hand() const { return in_hand_.size(); }
   double next_tick() const;
-  void set_current_job_age(double age) { current_job_age_ = age; }
 
  private:
   void on_welcome(const v1::Welcome& welcome, double now);
@@ -128,9 +126,6 @@ class WorkerSession {
   double next_hello_ = 0;
   double hello_wait_ = 0;
   double next_heartbeat_ = 0;
-  double current_job_age_ = 0;
-  std::uint64_t sequence_ = 0;
-  std::uint64_t finished_ = 0;
 
   struct InHand {
     std::uint64_t job = 0;

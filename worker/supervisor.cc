@@ -6,18 +6,10 @@
 #include <cstdio>
 
 #include "common/base/clock.h"
-#include "gapfarm/v1/farm.pb.h"
 #include "worker/service.h"
 
 namespace gapfarm {
 namespace {
-
-// As the master hears of it; one that did not answer has no blame.
-v1::ProcessEnd reported(EndCause cause) {
-  if (cause == EndCause::kCrashed) return v1::PROCESS_CRASHED;
-  if (cause == EndCause::kKilled) return v1::PROCESS_KILLED;
-  return cause == EndCause::kHung ? v1::PROCESS_HUNG : v1::PROCESS_LEFT;
-}
 
 ProcessPoolOptions pool_options(const SupervisorOptions& options) {
   ProcessPoolOptions pool;
@@ -38,7 +30,7 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
     if (replaced != nullptr) {
       all.insert(all.end(),
                  {"--replaces", replaced->name, "--replaced-end",
-                  std::to_string(reported(replaced->cause)), "--replaced-epoch",
+                  std::to_string(static_cast<int>(replaced->cause)), "--replaced-epoch",
                   std::to_string(replaced->epoch), "--replaced-attempt",
                   std::to_string(replaced->attempt), "--replaced-failure", replaced->failure});
     }

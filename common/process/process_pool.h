@@ -61,7 +61,7 @@ class ProgressPage {
   WorkerProgress* progress_ = nullptr;
 };
 
-// How a process ended, as far as blame goes.
+// How a process ended, as far as blame goes; a supervisor's workers report the number.
 enum class EndCause {
   kLeft,     // exit status 0 or kExitNoMaster, or a signal that asks to leave: nobody's fault
   kKilled,   // SIGKILL: from outside or out of memory

@@ -20,12 +20,6 @@ constexpr const char* kImpure =
     "(docs/objective.md)"
     ", else this machine computes wrongly";
 
-EndCause cause_of(v1::ProcessEnd end) {
-  if (end == v1::PROCESS_CRASHED) return EndCause::kCrashed;
-  if (end == v1::PROCESS_KILLED) return EndCause::kKilled;
-  return end == v1::PROCESS_HUNG ? EndCause::kHung : EndCause::kLeft;
-}
-
 auto find_holding(WorkerRecord& worker, std::uint64_t attempt) {
   return std::ranges::find_if(worker.holds, [&](const Holding& h) { return h.attempt == attempt; });
 }
@@ -148,9 +142,6 @@ void Scheduler::on_message(const std::string& peer, v1::Envelope* envelope, doub
     case v1::Envelope::kHeartbeat:
       on_heartbeat(*worker, envelope->heartbeat(), now);
       break;
-    case v1::Envelope::kResult:
-      on_result(*worker, envelope->mutable_result(), now);
-      break;
     case v1::Envelope::kResults:
       for (v1::JobResult& result : *envelope->mutable_results()->mutable_results()) {
         if (!on_result(*worker, &result, now)) return;
@@ -182,7 +173,7 @@ void Scheduler::on_hello(const std::string& peer, const v1::Hello& hello, double
   if (!hello.replaces().empty() && hello.replaces() != worker.name) {
     ProcessEnded end;
     end.name = hello.replaces();
-    end.cause = cause_of(hello.replaced_end());
+    end.cause = static_cast<EndCause>(hello.replaced_end());
     end.epoch = hello.replaced_epoch();
     end.attempt = hello.replaced_attempt();
     end.failure = hello.replaced_failure();
@@ -233,7 +224,7 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
     return;
   }
   worker.leaving |= heartbeat.leaving();
-  post(worker.peer).mutable_heartbeat()->set_sequence(heartbeat.sequence());
+  post(worker.peer).mutable_heartbeat();
   // Messages do get lost when links break.  A job that should have arrived long ago and is not
   // there, while its answer is not here, is out of the world.
   keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);

@@ -129,7 +129,7 @@ class ExternalVehicle final : public Vehicle {
     motion.duration_s = drive.duration_s + answer->rest_time_s;
     if (path == nullptr) return motion;
     path->clear();
-    for (const ExternalSample& s : answer->path) path->push_back({s.t_s, s.X_SB, 0, 0, 0, 0});
+    for (const ExternalSample& s : answer->path) path->push_back({s.t_s, s.X_SB, 0, 0});
     return motion;
   }
 
@@ -175,7 +175,7 @@ class ExternalRuns final : public WindowModel {
       request.times_s = times;
       const auto answer = ask_program(*simulator_, request, *problem_.external, steps);
       if (!answer) throw ExternalFailure(answer.error());
-      GroundMotion motion = motion_of(*answer, start, times);
+      GroundMotion motion = motion_of(*answer, times);
       if (answer->diverged) motion.message = refusal_of(*problem_.external, answer->message);
       return motion;
     };
@@ -183,8 +183,7 @@ class ExternalRuns final : public WindowModel {
   }
 
   // Its way stands in for that of wheels, which it does not answer.
-  static GroundMotion motion_of(const ExternalRunAnswer& answer, const GroundStart& start,
-                                std::span<const double> times) {
+  static GroundMotion motion_of(const ExternalRunAnswer& answer, std::span<const double> times) {
     GroundMotion motion;
     motion.outcome = answer.diverged ? MotionOutcome::kDiverged : MotionOutcome::kOk;
     Pose before;
@@ -195,7 +194,6 @@ class ExternalRuns final : public WindowModel {
       motion.samples.push_back({times[k], X_SR, travel_m});
       before = X_SR;
     }
-    if (!times.empty()) motion.simulated_s = times.back() - start.t_s;
     return motion;
   }
 

@@ -33,7 +33,6 @@ class RacquetballModel final : public ScenarioModel {
     const BallFlight flight = fly_ball(settings, task.command().duration(), task.interval(), steps);
     v1::TaskResult result;
     result.set_outcome(flight.diverged ? v1::DIVERGED : v1::OK);
-    result.set_simulated(task.command().duration());
     for (const BallSample& ball : flight.path) {
       v1::TraceSample* sample = result.mutable_trace()->add_samples();
       sample->set_t(ball.t_s);

@@ -41,7 +41,6 @@ struct Prediction {
   NoiseTails tails;                     // of every trial's alternatives; covariances are the cores'
   std::vector<MotionFacts> facts;       // one a command of the problem
   unsigned conditions = 0;              // distinct motions that had to be simulated
-  double simulated_s = 0;
 };
 
 // Of one motion that depends on them.

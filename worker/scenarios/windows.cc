@@ -95,7 +95,6 @@ Prediction WindowModel::predict(const ParameterValues& values,
       motion =
           robot.run(run.commands, {run.start_s, {ahead, 0, run.turn_rad_s}}, times_[*trial.run]);
       ++prediction.conditions;
-      prediction.simulated_s += motion.simulated_s;
       prediction.facts.front().include(
           {motion.max_roll_rad, motion.max_pitch_rad, motion.max_heave_m, 0});
       if (motion.outcome != MotionOutcome::kOk) {

@@ -48,8 +48,6 @@ MotionSample blend(const MotionSample& a, const MotionSample& b, double t_s) {
   sample.X_SB.y = mix(a.X_SB.y, b.X_SB.y);
   sample.X_SB.theta = wrap_angle(a.X_SB.theta + f * wrap_angle(b.X_SB.theta - a.X_SB.theta));
   sample.height_m = mix(a.height_m, b.height_m);
-  sample.roll_rad = mix(a.roll_rad, b.roll_rad);
-  sample.pitch_rad = mix(a.pitch_rad, b.pitch_rad);
   sample.kinetic_energy_j = mix(a.kinetic_energy_j, b.kinetic_energy_j);
   return sample;
 }

@@ -63,7 +63,6 @@ class KinematicFarm : public AnsweringFarm {
       sample->set_t(t);
       *sample->mutable_pose() = to_proto(exp(motion_of(values, c.left(), c.right(), t)));
     }
-    to->set_rest_time(c.duration());
   }
 
   // The ends alone.

@@ -66,7 +66,7 @@ class Desk {
   void answer(const std::string& peer, const v1::Job& job, std::uint64_t epoch = 7,
               v1::Outcome outcome = v1::OK) {
     v1::Envelope envelope;
-    v1::JobResult* result = envelope.mutable_result();
+    v1::JobResult* result = envelope.mutable_results()->add_results();
     result->set_job_id(job.job_id());
     result->set_attempt_id(job.attempt_id());
     result->set_epoch(epoch);

@@ -163,10 +163,7 @@ void SimulatedFarm::start_worker(unsigned place, const ProcessEnded& replaced) {
   options.fingerprint = "build";
   options.numeric_class = "class";
   options.replaces = replaced.name;
-  options.replaced_end = replaced.cause == EndCause::kCrashed  ? v1::PROCESS_CRASHED
-                         : replaced.cause == EndCause::kKilled ? v1::PROCESS_KILLED
-                         : replaced.cause == EndCause::kHung   ? v1::PROCESS_HUNG
-                                                               : v1::PROCESS_LEFT;
+  options.replaced_end = static_cast<std::uint32_t>(replaced.cause);
   options.replaced_epoch = replaced.epoch;
   options.replaced_attempt = replaced.attempt;
   options.deadline_s = worker->deadline;

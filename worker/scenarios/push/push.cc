@@ -36,9 +36,6 @@ class PushSession {
                          (outcome == v1::INVALID_REQUEST ? ": there is no finger's way" : ""));
       break;
     }
-    double simulated_s = 0;
-    for (const auto& [name, piece] : pieces_) simulated_s += piece.simulated_s();
-    result.set_simulated(simulated_s);
     return result;
   }
 
@@ -123,7 +120,6 @@ v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
   count_step(steps);
   v1::TaskResult result;
   result.set_outcome(push.outcome);
-  result.set_simulated(pushed.simulated_s());
   for (const PathSample& s : path) {
     v1::TraceSample* sample = result.mutable_trace()->add_samples();
     sample->set_t(s.t_s);
@@ -237,10 +233,7 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
     }
     prediction.trials.push_back({{whole}});
   }
-  for (const auto& [index, pushed] : pieces) {
-    prediction.conditions += pushed.runs();
-    prediction.simulated_s += pushed.simulated_s();
-  }
+  for (const auto& [index, pushed] : pieces) prediction.conditions += pushed.runs();
   return prediction;
 }
 

@@ -86,7 +86,6 @@ Motion PushedPiece::simulate(const Pose& X_WS, std::span<const TipSample> tip, c
 }
 
 PushedPiece::Push PushedPiece::pushed(const Pose& X_WS, const Motion& motion) {
-  simulated_s_ += motion.duration_s;
   ++runs_;
   return {to_outcome(motion.outcome), X_WS * motion.X_SE * inverse(X_RC_),
           std::hypot(motion.X_SE.x, motion.X_SE.y), motion};

@@ -61,7 +61,6 @@ class PushedPiece {
   Push push(const Pose& X_WR, std::uint32_t trial, std::span<const TipSample> tip,
             MotionMemo<PushKey>* memo);
 
-  double simulated_s() const { return simulated_s_; }
   unsigned runs() const { return runs_; }
 
  private:
@@ -75,7 +74,6 @@ class PushedPiece {
   double camera_scale_;  // logged lengths over true ones
   Pose X_RC_;            // centroid in the log's frame
   std::unique_ptr<PushSimulator> simulator_;
-  double simulated_s_ = 0;
   unsigned runs_ = 0;
 };
 

@@ -212,7 +212,6 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     prediction.outcome = outcome;
     prediction.message = robot.described("command " + problem_.commands[group.command].name);
     prediction.trials.clear();
-    prediction.simulated_s = robot.simulated_s();
     return prediction;
   };
 
@@ -255,7 +254,6 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     }
   }
   prediction.conditions = robot.runs();
-  prediction.simulated_s = robot.simulated_s();
   return prediction;
 }
 

@@ -87,7 +87,6 @@ class Session {
         break;
       }
     }
-    result.set_simulated(robot_.simulated_s());
     return result;
   }
 
@@ -288,7 +287,6 @@ Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, co
   const DriveInput input{side_drive(state.left, full_speed_m_s_, gains.left),
                          side_drive(state.right, full_speed_m_s_, gains.right), state.duration_s};
   const Motion motion = vehicle_->run(input, floor, path, interval_s);
-  simulated_s_ += motion.duration_s;
   ++runs_;
   message_ = motion.message;
   return motion;
@@ -328,16 +326,12 @@ v1::TaskResult trace_command(const Problem& problem, const ParameterValues& valu
       robot.run({c.left(), c.right(), c.duration()}, {}, gains, &path, task.interval());
   result.set_outcome(to_outcome(motion.outcome));
   result.set_message(motion.message);
-  result.set_simulated(motion.duration_s);
   v1::TraceResult* trace = result.mutable_trace();
-  trace->set_rest_time(motion.rest_time_s);
   for (const MotionSample& s : path) {
     v1::TraceSample* sample = trace->add_samples();
     sample->set_t(s.t_s);
     *sample->mutable_pose() = to_proto(s.X_SB);
     sample->set_height(s.height_m);
-    sample->set_roll(s.roll_rad);
-    sample->set_pitch(s.pitch_rad);
   }
   return result;
 }

@@ -86,7 +86,6 @@ class Srv1Robot {
   Motion run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
              std::vector<MotionSample>* path = nullptr, double interval_s = 0);
   // Motions that the memo had count like others.
-  double simulated_s() const { return simulated_s_; }
   unsigned runs() const { return runs_; }
   // `where`, with what the last motion says of why it did not end well.
   std::string described(const std::string& where) const;
@@ -96,7 +95,6 @@ class Srv1Robot {
   NoiseSettings noise_;
   double full_speed_m_s_ = 0;
   std::unique_ptr<Vehicle> vehicle_;
-  double simulated_s_ = 0;
   unsigned runs_ = 0;
   std::string message_;  // of the last motion
 };

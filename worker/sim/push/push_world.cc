@@ -135,8 +135,6 @@ MotionSample PushWorld::state(double t_s) const {
   sample.t_s = t_s;
   sample.X_SB = {centroid.x(), centroid.y(), wrap_angle(std::atan2(ahead.y(), ahead.x()))};
   sample.height_m = centroid.z() - settings_.thickness_m / 2;
-  sample.roll_rad = clamped_asin(X_SB.getBasis()[2][1]);
-  sample.pitch_rad = -clamped_asin(X_SB.getBasis()[2][0]);
   const double L = settings_.length_scale;
   sample.kinetic_energy_j = body_kinetic_energy(*body_) / (L * L);
   return sample;

@@ -140,7 +140,6 @@ class Follower {
       }
       take();
     }
-    motion_.simulated_s = static_cast<double>(stepped_) * step_s_;
     motion_.max_roll_rad = std::asin(std::min(roll_sine_, 1.0));
     motion_.max_pitch_rad = std::asin(std::min(pitch_sine_, 1.0));
     return std::move(motion_);
@@ -181,7 +180,6 @@ class Follower {
     compile_motions(robot_, wheels, &motions_);
     patches_.step(motions_, step_s_);
     ++step_;
-    ++stepped_;
     double travel = 0;
     for (const WheelMotion& w : wheels) travel += std::abs(w.speed_m_s);
     now_.t_s = time_of(step_);
@@ -208,7 +206,6 @@ class Follower {
   std::span<const double> times_;
   std::size_t next_ = 0;
   long step_ = 0;
-  long stepped_ = 0;
   double driven_ = 1;  // wheels
   double stood_s_ = 0;
   double roll_sine_ = 0, pitch_sine_ = 0;

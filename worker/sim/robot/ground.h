@@ -44,7 +44,6 @@ struct GroundMotion {
   std::string message;                // why it did not end well, of who says so
   std::vector<GroundSample> samples;  // one a time asked for
   double max_roll_rad = 0, max_pitch_rad = 0, max_heave_m = 0;
-  double simulated_s = 0;  // without what the robot stood through
 };
 
 struct GroundStart {

@@ -91,8 +91,6 @@ struct MotionSample {
   double t_s = 0;
   Pose X_SB;            // turning centre
   double height_m = 0;  // of the body's origin above its resting height
-  double roll_rad = 0;
-  double pitch_rad = 0;
   double kinetic_energy_j = 0;
 };
 

@@ -93,8 +93,6 @@ MotionSample Simulator::sample(double t_s) {
   result.t_s = t_s;
   result.X_SB = pose();
   result.height_m = (X_SB * world_->robot().turning_centre()).z();
-  result.roll_rad = clamped_asin(X_SB.getBasis()[2][1]);
-  result.pitch_rad = -clamped_asin(X_SB.getBasis()[2][0]);
   result.kinetic_energy_j = world_->robot().kinetic_energy();
   return result;
 }
