@@ -3,6 +3,7 @@
 
 #include "common/base/build_info.h"
 #include "common/config/sections.h"
+#include "common/problem/message_parts.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 

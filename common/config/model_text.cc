@@ -4,6 +4,7 @@
 #include "common/base/text.h"
 #include "common/config/model.h"
 #include "common/config/sections.h"
+#include "common/problem/message_parts.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 

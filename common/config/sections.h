@@ -95,11 +95,6 @@ void read_fitness(TomlSection& section, FitnessSettings& fitness);
 void read_spread(TomlSection& top, SpreadSettings& spread);
 void read_optimiser(TomlSection& top, OptimiserSettings& optimiser);
 
-// [residual] of a model; nothing is written where there is none.
-void read_residual(TomlSection& top, Model& model);
-void write_residual(const Model& model, TomlLines& out);
-Status check_residual_of(const Model& model);
-
 // The value of a row as TOML writes it: a number, a boolean or a choice's word.  None when it is
 // not one that the row accepts; the error is reported.
 std::optional<double> row_value(const toml::node& node, const ParameterTable& table,

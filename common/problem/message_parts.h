@@ -5,6 +5,9 @@
 
 namespace gapfarm {
 
+class TomlLines;
+class TomlSection;
+
 void write_fitness(const FitnessSettings& from, v1::Fitness* to);
 // REQUIRES: a valid kind.
 FitnessSettings fitness_of_message(const v1::Fitness& from);
@@ -20,8 +23,12 @@ Status check_program(const ExternalProgram& program, const Problem& problem);
 // that is none.
 Status read_external(const v1::Problem& message, Problem* problem);
 
-void write_residual(const Problem& problem, v1::Problem* message);
-// Errors: a scenario that takes none, check_residual()'s.  REQUIRES: the problem's commands.
+// [residual] of models and messages; nothing is written where there is none.
+void write_residual(const Simulated& model, TomlLines& out);
+// REQUIRES: the commands.
+void read_residual(TomlSection& top, Simulated& model);
 Status read_residual(const v1::Problem& message, Problem* problem);
+// Errors: a scenario that takes none, check_residual()'s and check_outliers()'.
+Status check_residual_of(const Simulated& model);
 
 }  // namespace gapfarm

@@ -10,6 +10,7 @@
 #include "common/base/hash.h"
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/config/toml_section.h"
 #include "common/problem/message_parts.h"
 #include "common/problem/problem.h"
 #include "common/trials/read.h"
@@ -321,7 +322,9 @@ v1::Problem to_proto(const Problem& problem) {
   for (const Piece& piece : problem.pieces) *message.add_pieces() = to_proto(piece);
   for (const Trial& trial : problem.log.trials) *message.add_trials() = to_proto(trial);
   write_external(problem, &message);
-  write_residual(problem, &message);
+  TomlLines residual;
+  write_residual(problem, residual);
+  message.set_residual(residual.text());
   if (!problem.robot_file.empty()) message.set_robot(problem.robot_file);
   for (const CommandedRun& run : problem.runs) {
     v1::Run* to = message.add_runs();

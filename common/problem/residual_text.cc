@@ -1,8 +1,11 @@
+// [residual] of models, which a problem's message carries as it is.
+#include <algorithm>
+#include <cctype>
 #include <optional>
 
-#include "common/config/sections.h"
-#include "common/problem/problem.h"
-#include "common/trials/text/csv.h"
+#include "common/base/text.h"
+#include "common/config/toml_section.h"
+#include "common/problem/message_parts.h"
 
 namespace gapfarm {
 namespace {
@@ -29,7 +32,7 @@ std::optional<Eigen::MatrixXd> read_rows(TomlSection& section, const std::string
   return matrix;
 }
 
-void read_weights(TomlSection& section, const Model& model, ResidualTerm* term) {
+void read_weights(TomlSection& section, const Simulated& model, ResidualTerm* term) {
   section.within("weights", [&](TomlSection& weights) {
     const auto read = [&](const std::string& key, const std::string& command) {
       auto rows = read_rows(weights, key, 3);
@@ -40,7 +43,7 @@ void read_weights(TomlSection& section, const Model& model, ResidualTerm* term) 
   });
 }
 
-ResidualTerm read_term(TomlSection& section, const Model& model) {
+ResidualTerm read_term(TomlSection& section, const Simulated& model) {
   ResidualTerm term;
   section.read("frame", term.frame, residual_frame_names());
   section.read("by_drive", term.by_drive);
@@ -57,7 +60,7 @@ ResidualTerm read_term(TomlSection& section, const Model& model) {
 }
 
 // What is omitted is 0.
-void read_outliers(TomlSection& section, Model& model) {
+void read_outliers(TomlSection& section, Simulated& model) {
   section.within("strays", [&](TomlSection& own) {
     OutlierDrives outliers;
     own.read("kind", outliers.kind, outlier_kind_names());
@@ -81,6 +84,13 @@ std::string rows_text(const Eigen::MatrixXd& rows) {
   return toml_rows(lists, ",\n  ");
 }
 
+// A message may name commands as it likes.
+std::string weights_key(const std::string& command) {
+  if (command.empty()) return kAll;
+  const auto bare = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
+  return std::ranges::all_of(command, bare) ? command : toml_string(command);
+}
+
 void write_term(const ResidualTerm& term, TomlLines& out) {
   const auto known = residual_covariates();
   const auto name_of = [&](std::size_t covariate) { return std::string(known[covariate].name); };
@@ -91,13 +101,13 @@ void write_term(const ResidualTerm& term, TomlLines& out) {
   out.raw("lengths = [" + joined(term.lengths, ", ", toml_number) +
           "]\ncentres = " + rows_text(term.centres) + "\n[residual.terms.weights]\n");
   for (const ResidualWeights& w : term.weights) {
-    out.raw((w.command.empty() ? kAll : w.command) + " = " + rows_text(w.shifts) + "\n");
+    out.raw(weights_key(w.command) + " = " + rows_text(w.shifts) + "\n");
   }
 }
 
 }  // namespace
 
-Status check_residual_of(const Model& model) {
+Status check_residual_of(const Simulated& model) {
   if (model.residual.empty()) return {};
   if (!scenario_form(model.scenario).residual) {
     return Error{"scenario " + model.scenario +
@@ -107,7 +117,7 @@ Status check_residual_of(const Model& model) {
   return model.residual.outliers ? check_outliers(*model.residual.outliers) : Status();
 }
 
-void read_residual(TomlSection& top, Model& model) {
+void read_residual(TomlSection& top, Simulated& model) {
   auto section = top.section("residual");
   if (!section) return;
   read_outliers(*section, model);
@@ -126,7 +136,7 @@ void read_residual(TomlSection& top, Model& model) {
   }
 }
 
-void write_residual(const Model& model, TomlLines& out) {
+void write_residual(const Simulated& model, TomlLines& out) {
   if (model.residual.empty()) return;
   out.raw(
       "\n# What nothing in the catalogue explains, as a correction of where drives end; it is no "
@@ -135,6 +145,15 @@ void write_residual(const Model& model, TomlLines& out) {
       "most, of what all others have `rest` of.\n[residual]\n");
   for (const ResidualTerm& term : model.residual.field) write_term(term, out);
   if (model.residual.outliers) write_outliers(*model.residual.outliers, out);
+}
+
+Status read_residual(const v1::Problem& message, Problem* problem) {
+  ASSIGN_OR_RETURN(const auto parsed, parse_toml(message.residual(), "problem"));
+  TomlErrors errors("problem");
+  TomlSection top(parsed, "", errors);
+  read_residual(top, *problem);
+  top.finish();
+  return errors.empty() ? Status() : errors.error();
 }
 
 }  // namespace gapfarm
