@@ -1,8 +1,10 @@
 // gapfarm-worker: evaluates what a master sends.
+#include <google/protobuf/text_format.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <thread>
@@ -36,13 +38,16 @@ Exit status: 0 stopped as asked or the master's work is done, 2 wrong usage, 69 
 --wait-limit, 78 no master that would have this worker.)";
 
 struct Arguments : ServiceOptions {
+  std::vector<std::string> given;  // all of them, as they were
+  std::string name;
+  unsigned window = 0;
   std::string keys = KeyFolder::default_path();
   bool insecure = false;
   unsigned processes = std::max(1u, std::thread::hardware_concurrency());
   double lifetime_s = 0;
   ProcessLimits limits;
   bool allow_external = false;
-  bool process = false;  // one of a supervisor's
+  std::string process;  // of one of a supervisor's: its greeting
 };
 
 void describe(CLI::App& app, Arguments* arguments) {
@@ -52,15 +57,14 @@ void describe(CLI::App& app, Arguments* arguments) {
   app.add_option("--connect", arguments->endpoint, "The master: tcp://HOST:PORT or ipc://PATH")
       ->required()
       ->type_name("ENDPOINT");
-  app.add_option("--name", arguments->session.name,
-                 "Begin of the workers' names (default: the host's)");
+  app.add_option("--name", arguments->name, "Begin of the workers' names (default: the host's)");
   app.add_option("--keys", arguments->keys,
                  "Folder with worker.key and master.pub, which tcp:// needs (docs/security.md)")
       ->type_name("FOLDER")
       ->capture_default_str();
   app.add_flag("--insecure", arguments->insecure,
                "Talk to a master that has no keys: unencrypted, and to whoever answers");
-  app.add_option("--window", arguments->session.window,
+  app.add_option("--window", arguments->window,
                  "Jobs in hand, the one in work included (default: as the master likes)")
       ->check(CLI::Range(1, 1000));
   app.add_option("--processes", arguments->processes, "Worker processes")
@@ -92,14 +96,8 @@ void describe(CLI::App& app, Arguments* arguments) {
   // For the processes that start this one; no user needs them.
   app.add_flag("--local", arguments->local)->group("");
   app.add_flag("--announce", arguments->announce)->group("");
-  app.add_flag("--process", arguments->process)->group("");
-  app.add_option("--replaces", arguments->session.replaces)->group("");
-  app.add_option("--replaced-end", arguments->session.replaced_end)
-      ->check(CLI::Range(0, static_cast<int>(EndCause::kStuck)))
-      ->group("");
-  app.add_option("--replaced-epoch", arguments->session.replaced_epoch)->group("");
-  app.add_option("--replaced-attempt", arguments->session.replaced_attempt)->group("");
-  app.add_option("--replaced-failure", arguments->session.replaced_failure)->group("");
+  app.add_option("--process", arguments->process)->group("");
+  app.add_option("--deadline", arguments->session.deadline_s)->group("");
 }
 
 int complain(const Error& error, int status) {
@@ -126,11 +124,14 @@ int work(const Arguments& arguments) {
   const StopOnSignals signals(&stop, StopOnSignals::kIgnoreInterrupt);
   ServiceOptions options = arguments;
   options.security = std::move(*security);
-  options.session.host = host_name();
-  options.session.fingerprint = build_info().fingerprint;
-  options.session.numeric_class = numeric_class();
-  if (arguments.lifetime_s > 0) {
-    options.session.deadline_s = monotonic_seconds() + arguments.lifetime_s;
+  v1::Hello& hello = options.session.hello;
+  hello.set_name(arguments.name);
+  hello.set_host(host_name());
+  hello.set_fingerprint(build_info().fingerprint);
+  hello.set_numeric_class(numeric_class());
+  hello.set_window(arguments.window);
+  if (!google::protobuf::TextFormat::MergeFromString(arguments.process, &hello)) {
+    return complain({"--process is no greeting"}, kExitUsage);
   }
   const auto page = ProgressPage::inherit();
   if (!page) return complain(page.error(), 1);
@@ -158,26 +159,16 @@ int start_workers(const Arguments& arguments) {
   }
   StopSource stop;
   const StopOnSignals signals(&stop);
-  SupervisorOptions options;
-  options.program = executable_path();
-  options.name = unique_worker_name(arguments.session.name);
-  options.processes = arguments.processes;
-  options.arguments = {"--connect", arguments.endpoint, "--keys", arguments.keys};
-  if (arguments.insecure) options.arguments.push_back("--insecure");
-  if (arguments.session.window > 0) {
-    options.arguments.insert(options.arguments.end(),
-                             {"--window", std::to_string(arguments.session.window)});
-  }
-  if (arguments.drain) options.arguments.push_back("--drain");
-  if (arguments.allow_external) options.arguments.push_back("--allow-external");
-  options.limits = arguments.limits;
-  if (arguments.wait_limit_s > 0) {
-    options.leaves_for_good = true;
-    options.arguments.insert(options.arguments.end(),
-                             {"--wait-limit", std::to_string(arguments.wait_limit_s)});
-  }
-  if (arguments.lifetime_s > 0) options.deadline_s = monotonic_seconds() + arguments.lifetime_s;
-  const Result<int> status = supervise(options, stop);
+  const double deadline_s = arguments.session.deadline_s;
+  ProcessPoolOptions pool;
+  pool.program = executable_path();
+  pool.count = arguments.processes;
+  pool.name_prefix = unique_worker_name(arguments.name);
+  pool.failure_limit = {};
+  pool.limits = arguments.limits;
+  // The next would not find the time for a job, or a master, as the one before did not.
+  pool.replaces_leavers = arguments.wait_limit_s <= 0 && !std::isfinite(deadline_s);
+  const Result<int> status = supervise(std::move(pool), arguments.given, deadline_s, stop);
   return status ? *status : complain(status.error(), kExitRefused);
 }
 
@@ -196,6 +187,11 @@ int main(int argc, char** argv) {
                  gapfarm::usage_sentence(app, error).c_str());
     return gapfarm::kExitUsage;
   }
-  const bool one = arguments.local || arguments.process;
+  arguments.given.assign(argv + 1, argv + argc);
+  double& deadline_s = arguments.session.deadline_s;
+  if (arguments.lifetime_s > 0 && !std::isfinite(deadline_s)) {
+    deadline_s = gapfarm::monotonic_seconds() + arguments.lifetime_s;
+  }
+  const bool one = arguments.local || !arguments.process.empty();
   return one ? gapfarm::work(arguments) : gapfarm::start_workers(arguments);
 }

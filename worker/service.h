@@ -3,7 +3,6 @@
 
 #include <condition_variable>
 #include <deque>
-#include <limits>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -83,23 +82,14 @@ Result<int> serve(const ServiceOptions& options, EvaluationThread& evaluation, S
 
 // Keeps worker processes alive on a machine that no master runs on.
 
-struct SupervisorOptions {
-  std::string program;                 // this executable
-  std::string name;                    // prefix of the workers' names, unique on the farm
-  std::vector<std::string> arguments;  // for every worker, beside --name and --process
-  unsigned processes = 1;
-  ProcessLimits limits;
-  bool leaves_for_good = false;  // a worker that leaves unasked is not replaced: nor would it work
-  // s of the monotonic clock, by which the workers have gone (they are asked to go, and none is
-  // started again after it).
-  double deadline_s = std::numeric_limits<double>::infinity();
-};
-
 // Starts the workers, kills those that hang (see ProcessLimits) and starts them again when they
 // end; the new one reports to the master how the old one ended, so that a task that kills workers
 // is found out.  Passes a first and a second stop request on.  Returns when asked to stop, or all
 // have left by themselves: 0, or kExitNoMaster when one did for that; error: none could be kept
-// alive.
-Result<int> supervise(const SupervisorOptions& options, StopSource& stop);
+// alive.  `arguments` are for every worker, beside what says who it is.  By `deadline_s`, of the
+// monotonic clock, the workers have gone: they are asked to go, and none is started again after it.
+// REQUIRES: a prefix of names that is unique on the farm; the pool's own arguments are not used.
+Result<int> supervise(ProcessPoolOptions pool, const std::vector<std::string>& arguments,
+                      double deadline_s, StopSource& stop);
 
 }  // namespace gapfarm

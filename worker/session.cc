@@ -214,20 +214,11 @@ void WorkerSession::on_tick(double now) {
 
 void WorkerSession::greet(double now) {
   hello_wait_ = std::clamp(2 * hello_wait_, options_.hello_min_s, options_.hello_max_s);
-  next_hello_ = now + hello_wait_ * (1 + 0.5 * jitter(options_.name, ++hellos_));
+  next_hello_ = now + hello_wait_ * (1 + 0.5 * jitter(options_.hello.name(), ++hellos_));
   v1::Hello* hello = outbox_.emplace_back().mutable_hello();
-  hello->set_name(options_.name);
-  hello->set_host(options_.host);
-  hello->set_fingerprint(options_.fingerprint);
-  hello->set_numeric_class(options_.numeric_class);
-  hello->set_window(options_.window);
+  *hello = options_.hello;
   hello->set_epoch(epoch_);
   for (const auto& [attempt, job] : in_hand_) hello->add_attempts(attempt);
-  hello->set_replaces(options_.replaces);
-  hello->set_replaced_end(options_.replaced_end);
-  hello->set_replaced_epoch(options_.replaced_epoch);
-  hello->set_replaced_attempt(options_.replaced_attempt);
-  hello->set_replaced_failure(options_.replaced_failure);
   hello->set_leaving(leaving_ != Leaving::kNo);
 }
 

@@ -17,17 +17,8 @@
 namespace gapfarm {
 
 struct SessionOptions {
-  std::string name;  // unique among all workers of a master
-  std::string host;
-  std::string fingerprint;
-  std::string numeric_class;
-  unsigned window = 0;             // jobs wanted in hand; 0: as the master likes
-  std::string replaces;            // the process that this one makes up for, or empty
-  std::uint32_t replaced_end = 0;  // EndCause
-  // What that process had in work; attempt 0: nothing.
-  std::uint64_t replaced_epoch = 0;
-  std::uint64_t replaced_attempt = 0;
-  std::string replaced_failure;  // what it reported of that, or empty
+  // Who this is; what it holds and whether it leaves are the session's to say.
+  v1::Hello hello;
   // Between two hellos without an answer, doubled up to the maximum and stretched by up to a half
   // at random, so that the workers of a restarted master do not all come at once.
   double hello_min_s = 0.02;

@@ -1,3 +1,4 @@
+#include <google/protobuf/text_format.h>
 #include <poll.h>
 #include <signal.h>
 
@@ -11,50 +12,46 @@
 namespace gapfarm {
 namespace {
 
-ProcessPoolOptions pool_options(const SupervisorOptions& options) {
-  ProcessPoolOptions pool;
-  pool.program = options.program;
-  pool.count = options.processes;
-  pool.name_prefix = options.name;
-  pool.failure_limit = {};
-  pool.limits = options.limits;
-  // It would not find the time for a job, or a master, as the one before did not.
-  pool.replaces_leavers = !options.leaves_for_good && !std::isfinite(options.deadline_s);
-  pool.arguments = [arguments = options.arguments, prefix = options.name,
-                    deadline = options.deadline_s](const std::string& name,
-                                                   const ProcessEnded* replaced) {
-    std::vector<std::string> all = arguments;
-    all.insert(all.end(), {"--name", name, "--process"});
-    // One speaks for all: the first place's.
-    if (name.rfind(prefix + "-1.", 0) == 0) all.push_back("--announce");
-    if (replaced != nullptr) {
-      all.insert(all.end(),
-                 {"--replaces", replaced->name, "--replaced-end",
-                  std::to_string(static_cast<int>(replaced->cause)), "--replaced-epoch",
-                  std::to_string(replaced->epoch), "--replaced-attempt",
-                  std::to_string(replaced->attempt), "--replaced-failure", replaced->failure});
-    }
-    if (std::isfinite(deadline)) {
-      const double left = std::max(deadline - monotonic_seconds(), 0.001);
-      all.insert(all.end(), {"--lifetime", std::to_string(left)});
-    }
-    return all;
-  };
-  return pool;
-}
-
 void wait_for(const ProcessPool& pool, const StopSource& stop, double timeout_s) {
   std::vector<pollfd> polled = {{stop.fd(), POLLIN, 0}};
   for (int fd : pool.fds()) polled.push_back({fd, POLLIN, 0});
   poll(polled.data(), polled.size(), static_cast<int>(std::ceil(timeout_s * 1000)));
 }
 
+// What says who a worker is, for option --process.
+std::string greeting_of(const std::string& name, const ProcessEnded* replaced) {
+  v1::Hello hello;
+  hello.set_name(name);
+  if (replaced != nullptr) {
+    hello.set_replaces(replaced->name);
+    hello.set_replaced_end(static_cast<std::uint32_t>(replaced->cause));
+    hello.set_replaced_epoch(replaced->epoch);
+    hello.set_replaced_attempt(replaced->attempt);
+    hello.set_replaced_failure(replaced->failure);
+  }
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(hello, &text);
+  return text;
+}
+
 }  // namespace
 
-Result<int> supervise(const SupervisorOptions& options, StopSource& stop) {
-  ProcessPool pool(pool_options(options));
+Result<int> supervise(ProcessPoolOptions options, const std::vector<std::string>& arguments,
+                      double deadline_s, StopSource& stop) {
+  const bool mortal = !options.replaces_leavers;
+  options.arguments = [&arguments, deadline_s, first = options.name_prefix + "-1."](
+                          const std::string& name, const ProcessEnded* replaced) {
+    std::vector<std::string> all = arguments;
+    all.insert(all.end(), {"--process", greeting_of(name, replaced)});
+    if (std::isfinite(deadline_s)) {
+      all.insert(all.end(), {"--deadline", std::to_string(deadline_s)});
+    }
+    // One speaks for all: the first place's.
+    if (name.starts_with(first)) all.push_back("--announce");
+    return all;
+  };
+  ProcessPool pool(std::move(options));
   RETURN_IF_ERROR(pool.start(monotonic_seconds()));
-  const bool mortal = options.leaves_for_good || std::isfinite(options.deadline_s);
   unsigned stops = 0;
   bool no_master = false;
   std::string last_end;
@@ -66,7 +63,7 @@ Result<int> supervise(const SupervisorOptions& options, StopSource& stop) {
       pool.signal_all(SIGTERM);
     }
     const double now = monotonic_seconds();
-    if (now >= options.deadline_s) pool.retire();
+    if (now >= deadline_s) pool.retire();
     for (const ProcessEnded& end : pool.reap(now)) {
       if (stops > 0) continue;
       last_end = end.text;

@@ -106,10 +106,10 @@ class FleetWorker {
  private:
   static SessionOptions session_options(unsigned index) {
     SessionOptions options;
-    options.name = "echo-" + std::to_string(getpid()) + "-" + std::to_string(index);
-    options.host = "fleet";
-    options.fingerprint = build_info().fingerprint;
-    options.numeric_class = "fake";
+    options.hello.set_name("echo-" + std::to_string(getpid()) + "-" + std::to_string(index));
+    options.hello.set_host("fleet");
+    options.hello.set_fingerprint(build_info().fingerprint);
+    options.hello.set_numeric_class("fake");
     return options;
   }
 

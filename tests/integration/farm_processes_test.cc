@@ -171,9 +171,9 @@ TEST(Farm, RefusesAWorkerOfAnotherBuild) {
   ServiceOptions service;
   service.endpoint = (*farm)->endpoints().at(0);
   service.security.open = OpenLinks::kLoopback;
-  service.session.name = "stranger";
-  service.session.fingerprint = "another build";
-  service.session.numeric_class = "fake";
+  service.session.hello.set_name("stranger");
+  service.session.hello.set_fingerprint("another build");
+  service.session.hello.set_numeric_class("fake");
   std::string refusal;
   std::thread worker([&] {
     StopSource own;

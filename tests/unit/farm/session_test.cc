@@ -8,7 +8,7 @@ namespace gapfarm::session_test {
 
 WorkerSession welcomed(std::uint64_t epoch = 3) {
   SessionOptions options;
-  options.name = "w";
+  options.hello.set_name("w");
   WorkerSession session(options);
   session.on_tick(0);
   session.take_outbox();
