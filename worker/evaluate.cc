@@ -1,12 +1,12 @@
 #include "worker/evaluate.h"
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <utility>
 
 #include "common/base/hash.h"
+#include "common/problem/message_parts.h"
 #include "common/score/motion_model.h"
 #include "worker/fitness.h"
 #include "worker/scenarios/scenario.h"
@@ -149,21 +149,9 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
 
 v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::SimulateTask& task,
                    StepCounter* steps) {
-  const std::vector<CommandSpec>& known = p.problem().commands;
   for (const v1::PlannedTrial& planned : task.plan()) {
-    const Trial trial = from_proto(planned.trial());
-    const bool named = std::any_of(known.begin(), known.end(),
-                                   [&](const CommandSpec& c) { return c.name == trial.command; });
-    if (!named) return invalid("unknown command '" + trial.command + "' in a plan");
-    const bool duties =
-        std::abs(trial.left.value_or(0)) <= 1 && std::abs(trial.right.value_or(0)) <= 1;
-    const double duration = trial.duration_s.value_or(0);
-    if (!duties || !(duration >= 0 && duration <= 60)) {
-      return invalid("a plan needs duties in [-1, 1] and durations in [0, 60] s");
-    }
-    const Pose& X = trial.X_WS;
-    const double sum = X.x + X.y + X.theta + trial.t_s.value_or(0);
-    if (!std::isfinite(sum)) return invalid("a plan needs finite start poses and times");
+    const Status s = check_trial(from_proto(planned.trial()), p.problem());
+    if (!s) return invalid("a plan's " + s.error().message);
   }
   const double interval = task.path_interval();
   if (!(interval == 0 || interval >= kLeastPathInterval_s)) {
@@ -174,13 +162,9 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::S
 
 v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::TraceTask& task,
                    StepCounter* steps) {
-  const v1::Command& c = task.command();
-  const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
-  const bool lasts = c.duration() >= 0 && c.duration() <= 60;
-  if (!duties || !lasts || !(task.interval() >= kLeastPathInterval_s)) {
-    return invalid(
-        "a trace needs duties in [-1, 1], a duration in [0, 60] s and an interval of at least "
-        "0.0001 s");
+  if (const Status s = check_command(task.command()); !s) return invalid(s.error().message);
+  if (!(task.interval() >= kLeastPathInterval_s)) {
+    return invalid("a trace needs an interval of at least 0.0001 s");
   }
   if (!p.problem().residual.empty()) {
     return invalid(

@@ -1,4 +1,5 @@
-// Parts of a problem's message.  Internal to common/problem, but for the checks of configs.
+// Parts of a problem's message.  Internal to common/problem, but for what configs, models and tasks
+// have in common with it.
 #pragma once
 
 #include "common/problem/problem.h"
@@ -14,6 +15,11 @@ FitnessSettings fitness_of_message(const v1::Fitness& from);
 // What config files are held to (common/config/problem_sections.cc); a message may come from
 // anywhere.
 Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread);
+
+// What tasks and problems are held to: duties in [-1, 1], a duration in [0, 60] s (of windows any);
+// of a trial also a command of the problem's, finite poses and a finite time.
+Status check_command(const v1::Command& command);
+Status check_trial(const Trial& trial, const Problem& problem);
 
 // The program of scenario `external` or `objective`.
 void write_external(const Problem& problem, v1::Problem* message);

@@ -165,34 +165,22 @@ Status check_window(const Trial& trial, const Problem& problem, const std::strin
 
 Status read_commands(const v1::Problem& message, Problem* problem) {
   for (const v1::Command& c : message.commands()) {
-    const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
-    if (!duties || !(c.duration() >= 0 && c.duration() <= 60)) {
-      return invalid("command '" + c.name() +
-                     "' needs duties in [-1, 1] and a duration in [0, 60] s");
-    }
+    RETURN_IF_ERROR(under("problem", check_command(c)));
     problem->commands.push_back({c.name(), c.left(), c.right(), c.duration()});
   }
   if (!problem->commands.empty() || scenario_form(problem->scenario).objective) return {};
   return invalid("no commands");
 }
 
+std::string where_of(const Trial& trial) {
+  return "trial " + trial.session + "/" + std::to_string(trial.trial);
+}
+
 Status read_trials(const v1::Problem& message, Problem* problem) {
-  const std::vector<std::string> names = command_names(problem->commands);
   for (const v1::Trial& t : message.trials()) {
     Trial trial = from_proto(t);
-    const std::string where = "trial " + trial.session + "/" + std::to_string(trial.trial);
-    if (!contains(names, trial.command)) {
-      return invalid(where + ": unknown command '" + trial.command + "'" +
-                     suggestion(trial.command, names));
-    }
-    if (!finite(trial.X_WS) || !finite(trial.X_WE))
-      return invalid(where + ": a pose is not finite");
-    const bool bounded =
-        std::abs(trial.left.value_or(0)) <= 1 && std::abs(trial.right.value_or(0)) <= 1 &&
-        trial.duration_s.value_or(0) >= 0 && (trial.run || trial.duration_s.value_or(0) <= 60);
-    if (!bounded || !std::isfinite(trial.t_s.value_or(0))) {
-      return invalid(where + ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t");
-    }
+    const std::string where = where_of(trial);
+    RETURN_IF_ERROR(under("problem", check_trial(trial, *problem)));
     RETURN_IF_ERROR(check_tip(trial, !problem->pieces.empty(), where));
     RETURN_IF_ERROR(check_window(trial, *problem, where));
     problem->log.trials.push_back(std::move(trial));
@@ -201,6 +189,30 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
 }
 
 }  // namespace
+
+Status check_command(const v1::Command& c) {
+  const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
+  if (duties && c.duration() >= 0 && c.duration() <= 60) return {};
+  return Error{"command '" + c.name() + "' needs duties in [-1, 1] and a duration in [0, 60] s"};
+}
+
+Status check_trial(const Trial& trial, const Problem& problem) {
+  const std::vector<std::string> names = command_names(problem.commands);
+  if (!contains(names, trial.command)) {
+    return Error{where_of(trial) + ": unknown command '" + trial.command + "'" +
+                 suggestion(trial.command, names)};
+  }
+  if (!finite(trial.X_WS) || !finite(trial.X_WE)) {
+    return Error{where_of(trial) + ": a pose is not finite"};
+  }
+  const double lasts_s = trial.duration_s.value_or(0);
+  const bool bounded = std::abs(trial.left.value_or(0)) <= 1 &&
+                       std::abs(trial.right.value_or(0)) <= 1 && lasts_s >= 0 &&
+                       (problem.windows() || lasts_s <= 60);
+  if (bounded && std::isfinite(trial.t_s.value_or(0))) return {};
+  return Error{where_of(trial) +
+               ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t"};
+}
 
 v1::Pose to_proto(const Pose& pose) {
   v1::Pose message;

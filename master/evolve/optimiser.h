@@ -114,7 +114,7 @@ class Optimiser {
 
 // What every optimiser is made from.
 struct OptimiserSetup {
-  EvolutionSettings settings;
+  EvolutionSettings settings;             // such as a config may have
   const ParameterTable* table = nullptr;  // outlives the optimiser
   std::vector<Gene> genes;
   Genome nominal;  // of the config's own values; empty: unknown

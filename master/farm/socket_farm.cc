@@ -104,6 +104,23 @@ void SocketFarm::sleep(double now) {
   socket_->wait(fds, std::max(0.0, until - now));
 }
 
+namespace {
+
+Status check_size(std::size_t size, const std::string& what, const char* remedy) {
+  if (size <= kMaxMessageBytes / 2) return {};
+  return Error{what + " has " + std::to_string(size) + " bytes and a message at most " +
+               std::to_string(kMaxMessageBytes / 2) + "; " + remedy};
+}
+
+Status check(const std::vector<v1::Task>& tasks) {
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    RETURN_IF_ERROR(check_size(tasks[i].ByteSizeLong(), "task " + std::to_string(i), "split it"));
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<bool> SocketFarm::hand_over(const TakeAnswer& take) {
   std::vector<v1::Task> more;
   for (auto& [place, result] : scheduler_->take_answers()) {
@@ -154,10 +171,7 @@ SocketFarm::~SocketFarm() {
 }
 
 Status check_sendable(const v1::Problem& problem) {
-  const std::size_t size = problem.ByteSizeLong();
-  if (size <= kMaxMessageBytes / 2) return {};
-  return Error{"the problem has " + std::to_string(size) + " bytes and a message at most " +
-               std::to_string(kMaxMessageBytes / 2) + "; split the trial log or thin its paths"};
+  return check_size(problem.ByteSizeLong(), "the problem", "split the trial log or thin its paths");
 }
 
 std::string SocketFarm::add_problem(const v1::Problem& problem) {
@@ -166,17 +180,6 @@ std::string SocketFarm::add_problem(const v1::Problem& problem) {
   if (Status s = check_sendable(problem); !s) unsendable_[hash] = s.error().message;
   scheduler_->add_problem(hash, std::move(bytes));
   return hash;
-}
-
-Status SocketFarm::check(const std::vector<v1::Task>& tasks) const {
-  for (std::size_t i = 0; i < tasks.size(); ++i) {
-    const std::size_t size = tasks[i].ByteSizeLong();
-    if (size <= kMaxMessageBytes / 2) continue;
-    return Error{"task " + std::to_string(i) + " has " + std::to_string(size) +
-                 " bytes and a message at most " + std::to_string(kMaxMessageBytes / 2) +
-                 "; split it"};
-  }
-  return {};
 }
 
 Status SocketFarm::stream(const std::string& problem_hash, std::vector<v1::Task> tasks,

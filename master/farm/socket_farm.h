@@ -67,7 +67,6 @@ class SocketFarm : public Farm {
   void reap(double now);
   Status workers_can_be_had();
   void sleep(double now);
-  Status check(const std::vector<v1::Task>& tasks) const;
   Status loop(const TakeAnswer& take, const OnProgress& on_progress);
   // True: there are more tasks.
   Result<bool> hand_over(const TakeAnswer& take);

@@ -268,6 +268,8 @@ TEST(Config, RefusesWhatDoesNotFitTogether) {
   EXPECT_THAT(error_of("[simulate]\ncommands = [\"forward\", \"forward\"]\n"), HasSubstr("twice"));
   EXPECT_THAT(error_of("[simulate]\npath_interval = 1e-9\n"), HasSubstr("at least 0.0001 s"));
   EXPECT_THAT(error_of("[evolution]\ncrossovers = []\n"), HasSubstr("is empty"));
+  EXPECT_THAT(error_of("[evolution]\nmutations = []\n"), HasSubstr("is empty"));
+  EXPECT_THAT(error_of("[evolution]\nmutation_probability = 2\n"), HasSubstr("[0, 1]"));
 }
 
 TEST(Config, ListsEveryMistakeInTheFilesOrder) {

@@ -122,14 +122,7 @@ TEST(Genetic, SetupErrorsReportWhatIsWrong) {
   };
   using testing::HasSubstr;
   EXPECT_THAT(message([](auto& s) { s.genes.clear(); }), HasSubstr("search range"));
-  EXPECT_THAT(message([](auto& s) { s.settings.elitism = 10; }), HasSubstr("10 elites"));
   EXPECT_THAT(message([](auto& s) { s.nominal = {0.5}; }), HasSubstr("1 genes instead of 2"));
-  EXPECT_THAT(message([](auto& s) { s.settings.mutation_probability = 2; }), HasSubstr("[0, 1]"));
-  EXPECT_THAT(message([](auto& s) {
-                s.settings.crossovers.clear();
-                s.settings.mutations.clear();
-              }),
-              HasSubstr("no operators"));
 }
 
 TEST(Genetic, EitherKindOfOperatorMayBeMissing) {
