@@ -34,7 +34,23 @@ bool is_still(const btTransform& before, const btTransform& now, double dt_s) {
          (R1.getColumn(2) - R0.getColumn(2)).length2() < turn * turn;
 }
 
-double clamped_asin(double sine) { return std::asin(std::clamp(sine, -1.0, 1.0)); }
+Pose pose_of(const btTransform& X_SB, const btVector3& at) {
+  const btVector3 p = X_SB * at;
+  const btVector3 ahead = X_SB.getBasis().getColumn(0);
+  return {p.x(), p.y(), wrap_angle(std::atan2(ahead.y(), ahead.x()))};
+}
+
+void keep_extremes(const btMatrix3x3& R_SB, double height_m, Extremes& extremes) {
+  extremes.max_roll_rad = std::max(extremes.max_roll_rad, std::abs(R_SB[2].y()));
+  extremes.max_pitch_rad = std::max(extremes.max_pitch_rad, std::abs(R_SB[2].x()));
+  extremes.max_heave_m = std::max(extremes.max_heave_m, std::abs(height_m));
+}
+
+void turn_into_angles(Extremes& extremes) {
+  for (double* angle : {&extremes.max_roll_rad, &extremes.max_pitch_rad}) {
+    *angle = std::asin(std::min(*angle, 1.0));
+  }
+}
 
 namespace {
 

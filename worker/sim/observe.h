@@ -25,7 +25,12 @@ bool has_fallen(const btMatrix3x3& R_SB);
 // Lengths of the transforms in m.
 bool is_still(const btTransform& before, const btTransform& now, double dt_s);
 
-double clamped_asin(double sine);
+// Of a body's point `at` (in its frame), where its x axis points.
+Pose pose_of(const btTransform& X_SB, const btVector3& at);
+
+// Angles are kept by their sines until the end.
+void keep_extremes(const btMatrix3x3& R_SB, double height_m, Extremes& extremes);
+void turn_into_angles(Extremes& extremes);
 
 // Samples at every `interval_s`, between the states that a model passes through.
 class PathRecorder {

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
-#include "worker/sim/observe.h"
-#include "worker/sim/world.h"
+#include "worker/sim/patch_robot.h"
 
 namespace gapfarm {
 namespace {
@@ -24,53 +22,26 @@ double reach(const PatchSettings& settings) {
 
 }  // namespace
 
-class PatchRobot::Impl final : public LeanWorld {
- public:
-  Impl(const PatchSettings& settings, StepCounter* steps)
-      : LeanWorld(1, false, settings.solver_iterations),
-        settings_(settings),
-        radius_(kSphereShare * reach(settings)),
-        plane_(btVector3(0, 0, 1), 0),
-        sphere_(radius_),
-        compound_(false, static_cast<int>(settings.patches.size())),
-        motions_(settings.patches.size()),
-        steps_(steps) {
-    setGravity(btVector3(0, 0, -settings.gravity_m_s2));
-    for (const Patch& p : settings.patches) {
-      const btVector3 at(p.x_m - settings.com_x_m, p.y_m - settings.com_y_m,
-                         radius_ - settings.com_z_m);
-      compound_.addChildShape(btTransform(btMatrix3x3::getIdentity(), at), &sphere_);
-      grips_.push_back({p.ratio, p.rolls_across});
-    }
+PatchRobot::PatchRobot(const PatchSettings& settings, StepCounter* steps)
+    : LeanWorld(1, false, settings.solver_iterations),
+      settings_(settings),
+      radius_(kSphereShare * reach(settings)),
+      plane_(btVector3(0, 0, 1), 0),
+      sphere_(radius_),
+      compound_(false, static_cast<int>(settings.patches.size())),
+      motions_(settings.patches.size()),
+      steps_(steps) {
+  setGravity(btVector3(0, 0, -settings.gravity_m_s2));
+  for (const Patch& p : settings.patches) {
+    const btVector3 at(p.x_m - settings.com_x_m, p.y_m - settings.com_y_m,
+                       radius_ - settings.com_z_m);
+    compound_.addChildShape(btTransform(btMatrix3x3::getIdentity(), at), &sphere_);
+    grips_.push_back({p.ratio, p.rolls_across});
   }
-  ~Impl() override { clear(); }
+  reset({});
+}
 
-  void reset(const BodyTwist& twist);
-  void step(std::span<const PatchMotion> motions, double dt_s);
-  const btRigidBody& body() const { return *body_; }
-  btVector3 origin() const { return {-settings_.com_x_m, -settings_.com_y_m, -settings_.com_z_m}; }
-  std::vector<double> loads();
-
- private:
-  void prepare_contacts() override;
-  void clear();
-  // Child of the body's shape that a contact belongs to.
-  int patch_of(const btManifoldPoint& point, bool floor_is_second) const {
-    return floor_is_second ? point.m_index0 : point.m_index1;
-  }
-
-  PatchSettings settings_;
-  double radius_;
-  btStaticPlaneShape plane_;
-  btSphereShape sphere_;
-  btCompoundShape compound_;
-  std::vector<ContactGrip> grips_;
-  std::vector<PatchMotion> motions_;
-  std::optional<btRigidBody> floor_, body_;
-  StepCounter* steps_;
-};
-
-void PatchRobot::Impl::clear() {
+void PatchRobot::clear() {
   if (!body_) return;
   removeRigidBody(&*body_);
   removeRigidBody(&*floor_);
@@ -78,7 +49,7 @@ void PatchRobot::Impl::clear() {
   floor_.reset();
 }
 
-void PatchRobot::Impl::reset(const BodyTwist& twist) {
+void PatchRobot::reset(const BodyTwist& twist) {
   clear();
   start_anew();
   floor_.emplace(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
@@ -99,20 +70,20 @@ void PatchRobot::Impl::reset(const BodyTwist& twist) {
   body_->setAngularVelocity(btVector3(0, 0, w));
 }
 
-void PatchRobot::Impl::step(std::span<const PatchMotion> motions, double dt_s) {
+void PatchRobot::step(std::span<const PatchMotion> motions, double dt_s) {
   std::copy(motions.begin(), motions.end(), motions_.begin());
   LeanWorld::step(dt_s, kRepairedShare * dt_s * settings_.step_rate_hz);
   count_step(steps_);
 }
 
-void PatchRobot::Impl::prepare_contacts() {
+void PatchRobot::prepare_contacts() {
   btVector3 ahead = body_->getWorldTransform().getBasis().getColumn(0);
   ahead.setZ(0);
   ahead = ahead.length2() > 1e-12 ? ahead.normalized() : btVector3(1, 0, 0);
   const btVector3 left(-ahead.y(), ahead.x(), 0);
   const double softness = kSoftness / settings_.mass_kg;
   each_contact(&*floor_, [&](btManifoldPoint& point, bool floor_is_second) {
-    const auto index = static_cast<std::size_t>(patch_of(point, floor_is_second));
+    const std::size_t index = patch_of(point, floor_is_second);
     const PatchMotion& motion = motions_[index];
     const double c = std::cos(motion.e1_rad);
     const double s = std::sin(motion.e1_rad);
@@ -134,11 +105,11 @@ void PatchRobot::Impl::prepare_contacts() {
   });
 }
 
-std::vector<double> PatchRobot::Impl::loads() {
+std::vector<double> PatchRobot::loads() {
   std::vector<double> loads(settings_.patches.size(), 0.0);
   double sum = 0;
   each_contact(&*floor_, [&](btManifoldPoint& point, bool floor_is_second) {
-    loads[static_cast<std::size_t>(patch_of(point, floor_is_second))] += point.m_appliedImpulse;
+    loads[patch_of(point, floor_is_second)] += point.m_appliedImpulse;
     sum += point.m_appliedImpulse;
   });
   if (sum > 0) {
@@ -147,43 +118,11 @@ std::vector<double> PatchRobot::Impl::loads() {
   return loads;
 }
 
-PatchRobot::PatchRobot(const PatchSettings& settings, StepCounter* steps)
-    : impl_(std::make_unique<Impl>(settings, steps)) {
-  impl_->reset({});
-}
-PatchRobot::~PatchRobot() = default;
-
-void PatchRobot::reset(const BodyTwist& twist) { impl_->reset(twist); }
-void PatchRobot::step(std::span<const PatchMotion> motions, double dt_s) {
-  impl_->step(motions, dt_s);
-}
-
-Pose PatchRobot::pose() const {
-  const btTransform& X_SB = impl_->body().getWorldTransform();
-  const btVector3 at = X_SB * impl_->origin();
-  const btVector3 ahead = X_SB.getBasis().getColumn(0);
-  return {at.x(), at.y(), std::atan2(ahead.y(), ahead.x())};
-}
-
 BodyTwist PatchRobot::twist() const {
-  const btRigidBody& body = impl_->body();
-  const btMatrix3x3& R_SB = body.getWorldTransform().getBasis();
-  const btVector3 v = body.getVelocityInLocalPoint(R_SB * impl_->origin()) * R_SB;
-  return {v.x(), v.y(), body.getAngularVelocity().z()};
+  const btMatrix3x3& R_SB = body_->getWorldTransform().getBasis();
+  const btVector3 v = body_->getVelocityInLocalPoint(R_SB * origin()) * R_SB;
+  return {v.x(), v.y(), body_->getAngularVelocity().z()};
 }
-
-bool PatchRobot::sane() const {
-  return is_sane(impl_->body().getLinearVelocity(), impl_->body().getAngularVelocity());
-}
-bool PatchRobot::fallen() const { return has_fallen(impl_->body().getWorldTransform().getBasis()); }
-double PatchRobot::roll_sine() const { return impl_->body().getWorldTransform().getBasis()[2][1]; }
-double PatchRobot::pitch_sine() const {
-  return -impl_->body().getWorldTransform().getBasis()[2][0];
-}
-double PatchRobot::height_m() const {
-  return (impl_->body().getWorldTransform() * impl_->origin()).z();
-}
-std::vector<double> PatchRobot::loads() const { return impl_->loads(); }
 
 Eigen::Vector3d gravity_in_start_frame(const Floor& floor, double gravity_m_s2) {
   const double along = gravity_m_s2 * std::sin(floor.tilt_rad);

@@ -1,18 +1,14 @@
-// A rigid body on contact patches: what every drive of a ground robot comes down to.
+// What every drive of a ground robot comes down to: patches, on which a rigid body stands.
 //
 // A patch has a place, a friction frame in the floor's plane whose first direction e1 may be turned
 // from step to step (steering), friction along e1 and across it, and a surface speed along e1.
 #pragma once
 
 #include <Eigen/Core>
-#include <memory>
-#include <span>
 #include <vector>
 
 #include "common/base/constants.h"
-#include "common/pose/pose.h"
 #include "worker/sim/robot/motion.h"
-#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 
@@ -47,35 +43,6 @@ struct PatchMotion {
 // Velocity of R's origin in R's axes.
 struct BodyTwist {
   double vx_m_s = 0, vy_m_s = 0, omega_rad_s = 0;
-};
-
-// Deterministic to the bit, whatever was simulated before reset().  One thread at a time.
-class PatchRobot {
- public:
-  // `steps` (may be null) outlives the robot.
-  explicit PatchRobot(const PatchSettings& settings, StepCounter* steps = nullptr);
-  ~PatchRobot();
-  PatchRobot& operator=(PatchRobot&&) = delete;
-
-  // At the origin of the start frame, heading along x, moving like this.
-  void reset(const BodyTwist& twist = {});
-  // One step; one motion a patch.
-  void step(std::span<const PatchMotion> motions, double dt_s);
-
-  Pose pose() const;  // of R in the start frame
-  BodyTwist twist() const;
-  // False when the integration has failed.
-  bool sane() const;
-  bool fallen() const;
-  double roll_sine() const;
-  double pitch_sine() const;
-  double height_m() const;  // of R's origin over the floor
-  // Share of the weight on each patch in the last step.
-  std::vector<double> loads() const;
-
- private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
 };
 
 // Gravity in S over a floor whose normal is S's z axis, m/s^2.

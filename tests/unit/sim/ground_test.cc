@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/sim/ground_robots.h"
+#include "worker/sim/patch_robot.h"
 
 namespace gapfarm::sim_ground_test {
 

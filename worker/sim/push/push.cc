@@ -5,49 +5,8 @@
 
 #include "worker/sim/observe.h"
 #include "worker/sim/push/push_engine.h"
-#include "worker/sim/push/push_world.h"
 
 namespace gapfarm {
-namespace {
-
-// In which the supports take up the load before the finger comes.
-constexpr long kSettleSteps = 8;
-
-class BulletPush final : public SteppedPush {
- public:
-  explicit BulletPush(const PushSettings& settings)
-      : SteppedPush(settings, kSettleSteps), world_(settings) {}
-
- private:
-  void reset(const Floor& table, const Eigen::Vector2d& velocity, double spin) override {
-    world_.reset(table, velocity, spin);
-  }
-  void step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt_s) override {
-    before_ = world_.metric_transform();
-    world_.step(from, to, dt_s);
-  }
-  void skip() override { world_.forget_touch(); }
-  MotionSample state(double t_s) const override { return world_.state(t_s); }
-  bool sane() const override {
-    return is_sane(world_.metric_velocity(), world_.body().getAngularVelocity());
-  }
-  bool still(double dt_s) const override {
-    return is_still(before_, world_.metric_transform(), dt_s);
-  }
-  bool stands(Motion& motion) const override {
-    const btMatrix3x3& basis = world_.body().getWorldTransform().getBasis();
-    motion.max_roll_rad = std::max(motion.max_roll_rad, std::abs(basis[2].y()));
-    motion.max_pitch_rad = std::max(motion.max_pitch_rad, std::abs(basis[2].x()));
-    motion.max_heave_m = std::max(motion.max_heave_m, std::abs(world_.state(0).height_m));
-    return !has_fallen(basis);
-  }
-
-  PushWorld world_;
-  btTransform before_;
-};
-
-}  // namespace
-
 std::vector<Eigen::Vector2d> support_corners(const PushSettings& settings) {
   const double c = std::cos(settings.stretch_direction_rad);
   const double s = std::sin(settings.stretch_direction_rad);
@@ -106,10 +65,6 @@ std::unique_ptr<PushSimulator> make_push_simulator(const PushSettings& settings)
       return make_distributed_push(settings);
   }
   return nullptr;
-}
-
-std::unique_ptr<PushSimulator> make_push_world(const PushSettings& settings) {
-  return std::make_unique<BulletPush>(settings);
 }
 
 Motion SteppedPush::run(std::span<const FingerSample> finger, const Floor& table,
@@ -178,8 +133,7 @@ Motion SteppedPush::follow(const FingerPath& finger_path, bool at_rest,
     if (rest_s == 0) moved_until = t;
   }
   motion.duration_s = static_cast<double>(steps) * dt;
-  motion.max_roll_rad = clamped_asin(motion.max_roll_rad);
-  motion.max_pitch_rad = clamped_asin(motion.max_pitch_rad);
+  turn_into_angles(motion);
   if (motion.outcome == MotionOutcome::kDiverged) return motion;
   motion.X_SE = state(t).X_SB;
   motion.rest_time_s = std::max(0.0, moved_until - finger_path.end_s());

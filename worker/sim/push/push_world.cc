@@ -4,9 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "worker/sim/observe.h"
 #include "worker/sim/patches.h"
-#include "worker/sim/push/push_engine.h"
 
 namespace gapfarm {
 
@@ -35,12 +33,14 @@ Touch nearest_touch(std::span<const Eigen::Vector2d> corners, const Eigen::Vecto
 
 namespace {
 
+// In which the supports take up the load before the finger comes.
+constexpr long kSettleSteps = 8;
 constexpr double kSupportRadius_m = 5e-4;
 // The finger is looked at when it is this near, and may come so much closer in a step.
 constexpr double kTouchRange_m = 2e-3;
 constexpr double kLeastFriction = 0.05;  // share that a falling friction keeps
 
-btRigidBody::btRigidBodyConstructionInfo still(btCollisionShape* shape) {
+btRigidBody::btRigidBodyConstructionInfo massless(btCollisionShape* shape) {
   return {0, nullptr, shape, btVector3(0, 0, 0)};
 }
 
@@ -51,12 +51,12 @@ btVector3 flat(const Eigen::Vector2d& p, double z) { return {p[0], p[1], z}; }
 PushWorld::PushWorld(const PushSettings& settings)
     : LeanWorld(1, settings.linear_damping > 0 || settings.angular_damping > 0,
                 settings.solver_iterations),
-      settings_(settings),
+      SteppedPush(settings, kSettleSteps),
       plane_(btVector3(0, 0, 1), 0),
       support_(kSupportRadius_m * settings.length_scale),
       finger_shape_(settings.finger_radius_m * settings.length_scale),
       plate_(false, static_cast<int>(settings.corners.size())),
-      floor_body_(still(&plane_)) {
+      floor_body_(massless(&plane_)) {
   btContactSolverInfo& info = getSolverInfo();
   info.m_erp = info.m_erp2 = settings.error_reduction;
   info.m_warmstartingFactor = 1;
@@ -114,7 +114,7 @@ void PushWorld::reset(const Floor& table, const Eigen::Vector2d& velocity, doubl
   body_->setAngularVelocity(btVector3(0, 0, spin));
   addRigidBody(&*body_, kContactGroup, kFloorGroup);
 
-  finger_.emplace(still(&finger_shape_));
+  finger_.emplace(massless(&finger_shape_));
   finger_->setCollisionFlags(finger_->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
   finger_->forceActivationState(DISABLE_DEACTIVATION);
   addRigidBody(&*finger_, kGhostGroup, 0);
@@ -129,18 +129,14 @@ btTransform PushWorld::metric_transform() const {
 
 MotionSample PushWorld::state(double t_s) const {
   const btTransform X_SB = metric_transform();
-  const btVector3 centroid = X_SB * btVector3(-settings_.com_x_m, -settings_.com_y_m, 0);
-  const btVector3 ahead = X_SB.getBasis().getColumn(0);
-  MotionSample sample;
-  sample.t_s = t_s;
-  sample.X_SB = {centroid.x(), centroid.y(), wrap_angle(std::atan2(ahead.y(), ahead.x()))};
-  sample.height_m = centroid.z() - settings_.thickness_m / 2;
+  const btVector3 centroid(-settings_.com_x_m, -settings_.com_y_m, 0);
   const double L = settings_.length_scale;
-  sample.kinetic_energy_j = body_kinetic_energy(*body_) / (L * L);
-  return sample;
+  return {t_s, pose_of(X_SB, centroid), (X_SB * centroid).z() - settings_.thickness_m / 2,
+          body_kinetic_energy(*body_) / (L * L)};
 }
 
 void PushWorld::step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt_s) {
+  before_ = metric_transform();
   const double L = settings_.length_scale;
   const double z = settings_.finger_height * settings_.thickness_m;
   // Bullet takes a kinematic body's velocity from its last transform and the one it has now.
@@ -234,6 +230,10 @@ void PushWorld::solveConstraints(btContactSolverInfo& info) {
   if (manifolds.size() == 0) return;  // in the air: nothing to solve, gravity is in the velocity
   solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(), &manifolds[0],
                     manifolds.size(), nullptr, 0, info, nullptr, &dispatcher);
+}
+
+std::unique_ptr<PushSimulator> make_push_world(const PushSettings& settings) {
+  return std::make_unique<PushWorld>(settings);
 }
 
 }  // namespace gapfarm

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "worker/sim/bullet.h"
-#include "worker/sim/push/push.h"
+#include "worker/sim/observe.h"
+#include "worker/sim/push/push_engine.h"
 #include "worker/sim/world.h"
 
 namespace gapfarm {
@@ -13,25 +13,28 @@ namespace gapfarm {
 // table at the corners of its support plate, where Bullet would put the contacts of a flat plate
 // too, each a small sphere.  Outline and finger meet at their nearest point, found exactly in the
 // plane: Bullet's own search answers with a margin and up to four points of arbitrary height.
-class PushWorld final : public LeanWorld {
+class PushWorld final : public LeanWorld, public SteppedPush {
  public:
   explicit PushWorld(const PushSettings& settings);
   ~PushWorld() override;
 
-  // Puts the piece at the start, at this speed (m/s, rad/s), in a state that no earlier run has
-  // touched.
-  void reset(const Floor& table, const Eigen::Vector2d& velocity, double spin);
-  // One physics step, in which the finger goes from one place to another, m.
-  void step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt_s);
-  // The step after this one does not follow from it: the finger jumps.
-  void forget_touch() { touch_.clearManifold(); }
-
-  MotionSample state(double t_s) const;  // of the centroid
-  const btRigidBody& body() const { return *body_; }
-  btTransform metric_transform() const;  // the body's, in m
-  btVector3 metric_velocity() const { return body_->getLinearVelocity() / settings_.length_scale; }
+  void reset(const Floor& table, const Eigen::Vector2d& velocity, double spin) override;
+  void step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt_s) override;
+  MotionSample state(double t_s) const override;
 
  private:
+  void skip() override { touch_.clearManifold(); }
+  bool sane() const override {
+    return is_sane(body_->getLinearVelocity() / settings_.length_scale,
+                   body_->getAngularVelocity());
+  }
+  bool still(double dt_s) const override { return is_still(before_, metric_transform(), dt_s); }
+  bool stands(Motion& motion) const override {
+    const btMatrix3x3& R_SB = body_->getWorldTransform().getBasis();
+    keep_extremes(R_SB, state(0).height_m, motion);
+    return !has_fallen(R_SB);
+  }
+  btTransform metric_transform() const;  // the body's, in m
   void solveConstraints(btContactSolverInfo& info) override;
 
   void clear();
@@ -39,7 +42,6 @@ class PushWorld final : public LeanWorld {
   void place_touch(const Eigen::Vector2d& finger_m, double advance_m, double dt_s);
   double table_friction(const btVector3& on_table, const btVector3& on_piece) const;
 
-  PushSettings settings_;
   Floor table_;
   btStaticPlaneShape plane_;
   btSphereShape support_;
@@ -49,6 +51,7 @@ class PushWorld final : public LeanWorld {
   std::optional<btRigidBody> body_;
   std::optional<btRigidBody> finger_;
   btPersistentManifold touch_;
+  btTransform before_;  // the last step, in m
 };
 
 }  // namespace gapfarm

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "worker/sim/observe.h"
+#include "worker/sim/patch_robot.h"
+
 namespace gapfarm {
 namespace {
 
@@ -105,7 +108,10 @@ void compile_motions(const GroundRobot& robot, std::span<const WheelMotion> whee
 
 GroundSimulator::GroundSimulator(const GroundRobot& robot, const GroundWorld& world,
                                  StepCounter* steps)
-    : robot_(robot), world_(world), patches_(compile_patches(robot, world), steps) {}
+    : robot_(robot),
+      world_(world),
+      patches_(std::make_unique<PatchRobot>(compile_patches(robot, world), steps)) {}
+GroundSimulator::~GroundSimulator() = default;
 
 namespace {
 
@@ -140,12 +146,12 @@ class Follower {
       }
       take();
     }
-    motion_.max_roll_rad = std::asin(std::min(roll_sine_, 1.0));
-    motion_.max_pitch_rad = std::asin(std::min(pitch_sine_, 1.0));
+    turn_into_angles(motion_);
     return std::move(motion_);
   }
 
  private:
+  Pose pose() const { return pose_of(patches_.body().getWorldTransform(), patches_.origin()); }
   double time_of(long step) const { return start_s_ + static_cast<double>(step) * step_s_; }
 
   // Samples up to now.
@@ -164,7 +170,7 @@ class Follower {
 
   void skip() {
     const double until = std::min(drive_.next_motion(now_.t_s), times_.back() + step_s_);
-    now_.X_SR = patches_.pose();
+    now_.X_SR = pose();
     const long steps = static_cast<long>(std::floor((until - now_.t_s) / step_s_)) - 1;
     if (steps > 0) step_ += steps;
     now_.t_s = time_of(step_);
@@ -185,12 +191,14 @@ class Follower {
     now_.t_s = time_of(step_);
     now_.travel_m += travel * step_s_ / driven_;
     // Poses cost; only those round a sample are looked at.
-    if (times_[next_] <= now_.t_s + 2 * step_s_) now_.X_SR = patches_.pose();
-    if (!patches_.sane()) return MotionOutcome::kDiverged;
-    roll_sine_ = std::max(roll_sine_, std::abs(patches_.roll_sine()));
-    pitch_sine_ = std::max(pitch_sine_, std::abs(patches_.pitch_sine()));
-    motion_.max_heave_m = std::max(motion_.max_heave_m, std::abs(patches_.height_m()));
-    if (patches_.fallen()) return MotionOutcome::kFellOver;
+    if (times_[next_] <= now_.t_s + 2 * step_s_) now_.X_SR = pose();
+    const btRigidBody& body = patches_.body();
+    if (!is_sane(body.getLinearVelocity(), body.getAngularVelocity())) {
+      return MotionOutcome::kDiverged;
+    }
+    const btTransform& X_SB = body.getWorldTransform();
+    keep_extremes(X_SB.getBasis(), (X_SB * patches_.origin()).z(), motion_);
+    if (has_fallen(X_SB.getBasis())) return MotionOutcome::kFellOver;
     const BodyTwist v = patches_.twist();
     const bool still = drive_.stands() && std::hypot(v.vx_m_s, v.vy_m_s) < kStillSpeed_m_s &&
                        std::abs(v.omega_rad_s) < kStillTurn_rad_s;
@@ -208,7 +216,6 @@ class Follower {
   long step_ = 0;
   double driven_ = 1;  // wheels
   double stood_s_ = 0;
-  double roll_sine_ = 0, pitch_sine_ = 0;
   GroundSample last_, now_;
   std::vector<PatchMotion> motions_;
   GroundMotion motion_;
@@ -218,7 +225,7 @@ class Follower {
 
 GroundMotion GroundSimulator::run(std::span<const CommandRow> commands, const GroundStart& start,
                                   std::span<const double> times) {
-  return Follower(robot_, patches_, 1 / world_.step_rate_hz, commands, start, times).run();
+  return Follower(robot_, *patches_, 1 / world_.step_rate_hz, commands, start, times).run();
 }
 
 }  // namespace gapfarm

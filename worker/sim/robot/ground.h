@@ -1,6 +1,7 @@
 // A ground robot that follows logged commands: its drive compiled to contact patches.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "common/robot/robot_drive.h"
 #include "worker/sim/patches.h"
 #include "worker/sim/robot/motion.h"
+#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 
@@ -39,11 +41,10 @@ struct GroundSample {
   double travel_m = 0;  // of the wheels since the start: mean of their absolute speeds over time
 };
 
-struct GroundMotion {
+struct GroundMotion : Extremes {
   MotionOutcome outcome = MotionOutcome::kOk;
   std::string message;                // why it did not end well, of who says so
   std::vector<GroundSample> samples;  // one a time asked for
-  double max_roll_rad = 0, max_pitch_rad = 0, max_heave_m = 0;
 };
 
 struct GroundStart {
@@ -51,10 +52,13 @@ struct GroundStart {
   BodyTwist twist;
 };
 
+class PatchRobot;
+
 class GroundSimulator {
  public:
   // `steps` (may be null) outlives the simulator.
   GroundSimulator(const GroundRobot& robot, const GroundWorld& world, StepCounter* steps = nullptr);
+  ~GroundSimulator();
 
   // Follows the commands from the start to the last of `times` (ascending, none before the start).
   // A run that ends otherwise than well has no samples.  The same answer to the same question,
@@ -65,7 +69,7 @@ class GroundSimulator {
  private:
   GroundRobot robot_;
   GroundWorld world_;
-  PatchRobot patches_;
+  std::unique_ptr<PatchRobot> patches_;
 };
 
 }  // namespace gapfarm

@@ -94,14 +94,18 @@ struct MotionSample {
   double kinetic_energy_j = 0;
 };
 
-struct Motion {
+// How far a body has left the floor's plane.
+struct Extremes {
+  double max_roll_rad = 0, max_pitch_rad = 0, max_heave_m = 0;
+};
+
+struct Motion : Extremes {
   MotionOutcome outcome = MotionOutcome::kOk;
   std::string message;     // why it did not end well, of who says so
   Pose X_SE;               // end pose of the tread centre, start frame; the heading is unwrapped
                            // by nothing: it lies in (-pi, pi]
   double rest_time_s = 0;  // from the motors' stop to rest
   double duration_s = 0;   // simulated time
-  double max_roll_rad = 0, max_pitch_rad = 0, max_heave_m = 0;
 };
 
 }  // namespace gapfarm

@@ -80,21 +80,10 @@ Simulator::Simulator(const SimSettings& settings, StepCounter* steps)
     : settings_(settings), world_(std::make_unique<RobotWorld>(settings)), watched_(steps) {}
 Simulator::~Simulator() = default;
 
-Pose Simulator::pose() {
-  const btTransform& X_SB = world_->robot().body().getWorldTransform();
-  const btVector3 centre = X_SB * world_->robot().turning_centre();
-  const btVector3 ahead = X_SB.getBasis().getColumn(0);
-  return {centre.x(), centre.y(), wrap_angle(std::atan2(ahead.y(), ahead.x()))};
-}
-
 MotionSample Simulator::sample(double t_s) {
   const btTransform& X_SB = world_->robot().body().getWorldTransform();
-  MotionSample result;
-  result.t_s = t_s;
-  result.X_SB = pose();
-  result.height_m = (X_SB * world_->robot().turning_centre()).z();
-  result.kinetic_energy_j = world_->robot().kinetic_energy();
-  return result;
+  const btVector3 centre = world_->robot().turning_centre();
+  return {t_s, pose_of(X_SB, centre), (X_SB * centre).z(), world_->robot().kinetic_energy()};
 }
 
 Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
@@ -111,8 +100,6 @@ Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<M
   motion.outcome = MotionOutcome::kNeverRested;
   PathRecorder recorder(path, interval_s);
   if (recorder.wanted()) recorder.add(sample(0));
-  double max_roll_sine = 0;
-  double max_pitch_sine = 0;
   double rest_s = 0;
   double t = 0;
   while (t < still_s + kSettleLimit_s) {
@@ -130,11 +117,7 @@ Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<M
       motion.outcome = MotionOutcome::kDiverged;
       break;
     }
-    const btVector3& up = now.getBasis()[2];
-    max_roll_sine = std::max(max_roll_sine, std::abs(up.y()));
-    max_pitch_sine = std::max(max_pitch_sine, std::abs(up.x()));
-    const double height = now.getOrigin().z() + up.dot(centre);
-    motion.max_heave_m = std::max(motion.max_heave_m, std::abs(height));
+    keep_extremes(now.getBasis(), (now * centre).z(), motion);
     if (recorder.wanted()) recorder.add(sample(t));
     if (has_fallen(now.getBasis())) {
       motion.outcome = MotionOutcome::kFellOver;
@@ -147,10 +130,9 @@ Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<M
     }
   }
   motion.duration_s = t;
-  motion.max_roll_rad = clamped_asin(max_roll_sine);
-  motion.max_pitch_rad = clamped_asin(max_pitch_sine);
+  turn_into_angles(motion);
   if (motion.outcome == MotionOutcome::kDiverged) return motion;
-  motion.X_SE = pose();
+  motion.X_SE = pose_of(body.getWorldTransform(), centre);
   motion.rest_time_s = std::max(0.0, t - rest_s - drive.duration_s);
   recorder.finish();
   return motion;

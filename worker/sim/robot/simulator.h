@@ -90,7 +90,6 @@ class Simulator {
 
  private:
   MotionSample sample(double t_s);
-  Pose pose();
 
   SimSettings settings_;
   std::unique_ptr<RobotWorld> world_;
