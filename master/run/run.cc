@@ -73,6 +73,11 @@ std::optional<TrialLog> trials_behind(const Model& model) {
   return *std::move(log);
 }
 
+Result<std::unique_ptr<Optimiser>> make_search(const OptimiserSetup& setup,
+                                               const std::vector<Stage>& stages) {
+  return stages.empty() ? make_optimiser(setup) : make_staged(setup, stages);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Optimiser>> optimiser_of(const RunRequest& run, const StagePlan& plan,
@@ -81,7 +86,7 @@ Result<std::unique_ptr<Optimiser>> optimiser_of(const RunRequest& run, const Sta
   OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
   const std::vector<Stage>& stages = plan.stages;
   if (!checkpoint && stages.empty()) RETURN_IF_ERROR(find_start(run, farm, watcher, &setup));
-  ASSIGN_OR_RETURN(auto made, stages.empty() ? make_optimiser(setup) : make_staged(setup, stages));
+  ASSIGN_OR_RETURN(auto made, make_search(setup, stages));
   if (checkpoint) RETURN_IF_ERROR(made->restore(checkpoint->optimiser_state));
   std::string reason = made->reason();
   const OptimiserKind kind = run.config.evolution.optimiser.kind;
@@ -138,9 +143,10 @@ Status check_runnable(const Config& config) {
   RETURN_IF_ERROR(check_values_in_range(config));
   OptimiserSetup setup;
   setup.settings = config.evolution;
+  setup.table = &config.problem.table();
   setup.genes = config.problem.genes;
-  RETURN_IF_ERROR(under(config.path, island_count(setup)));
   ASSIGN_OR_RETURN(const auto plan, read_stages(config));
+  RETURN_IF_ERROR(under(config.path, make_search(setup, plan.stages)));
   const auto log = read_validation(plan, config);
   return log ? Status() : Status(log.error());
 }

@@ -117,6 +117,13 @@ Result<Config> parse_stored(const RunInfo& info, const Problem& problem) {
   return config;
 }
 
+std::string merged_overrides(const RunInfo& info, const EvolutionOverrides& overrides) {
+  Json all = parse_json(info.overrides);
+  if (!all.is_object()) all = Json::object();
+  all.update(parse_json(overrides.to_json()));
+  return json_text(all);
+}
+
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
   ASSIGN_OR_RETURN(Problem problem, stored_problem(info));
   ASSIGN_OR_RETURN(auto config, parse_stored(info, problem));
@@ -125,9 +132,7 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   if (default_optimiser(info.config_text) && !parse_json(info.overrides).contains(kDefaultKind)) {
     config.evolution.optimiser.kind = OptimiserKind::kGenetic;
   }
-  EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
-  all.merge(overrides);
-  all.apply(config.evolution);
+  EvolutionOverrides::from_json(merged_overrides(info, overrides)).apply(config.evolution);
   config.evolution.start = stored_start(info, config.problem.genes.size());
   return config;
 }
@@ -178,12 +183,6 @@ void EvolutionOverrides::apply(EvolutionSettings& settings) const {
     if (this->*ours) settings.*theirs = *(this->*ours);
   });
   if (population) settings.optimiser.population = *population;
-}
-
-void EvolutionOverrides::merge(const EvolutionOverrides& later) {
-  each([&](const char*, auto ours, auto) {
-    if (later.*ours) this->*ours = later.*ours;
-  });
 }
 
 std::string EvolutionOverrides::to_json() const {

@@ -20,8 +20,6 @@ struct EvolutionOverrides {
   std::optional<unsigned> population;
 
   void apply(EvolutionSettings& settings) const;
-  // Those of `later` where it has them.
-  void merge(const EvolutionOverrides& later);
   std::string to_json() const;
   static EvolutionOverrides from_json(const std::string& text);
 };
@@ -36,6 +34,9 @@ Result<Problem> stored_problem(const RunReader& run);  // the error names the ru
 // The config's text, about the stored problem; its files, or those that the run's log was read from
 // in their place, as seen from where the run began, wherever this is called.
 Result<Config> parse_stored(const RunInfo& info, const Problem& problem);
+
+// RunInfo::overrides with these in place of those that it has.
+std::string merged_overrides(const RunInfo& info, const EvolutionOverrides& overrides);
 
 // The run's config and problem, with its overrides and then these.
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides);

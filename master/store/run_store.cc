@@ -252,6 +252,11 @@ Status RunStore::set_numeric_class(const std::string& numeric_class) {
   return {};
 }
 
+Status RunStore::set_overrides(const std::string& json) {
+  info_.overrides = json;
+  return database_.run("keep the run's options", "UPDATE run SET overrides = ?", json);
+}
+
 Status RunStore::set_progress(const Progress& progress) {
   // One column for both: a run that waits has not stopped.
   const bool running = progress.running();

@@ -47,6 +47,9 @@ class RunStore {
   // on with the run, whose numbers are its own: then the run is of that build.
   Status set_numeric_class(const std::string& numeric_class);
 
+  // What the command line gives the run from now on (RunInfo::overrides).
+  Status set_overrides(const std::string& json);
+
   // Commits a generation with all its individuals and the state after it in one transaction, on
   // disk when it returns.  Generations follow one another without gaps.  Returns the run's digest.
   Result<std::string> commit(const StoredGeneration& generation);

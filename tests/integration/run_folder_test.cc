@@ -83,6 +83,24 @@ TEST_F(RunFolder, AnEditedModelIsKept) {
   EXPECT_THAT(resume(run_, "3").err, Not(HasSubstr("kept as")));
 }
 
+TEST_F(RunFolder, WhatAResumeIsGivenIsTheRunsFromThenOn) {
+  for (const char* name : {"whole", "parts"}) {
+    ASSERT_EQ(evolve(folder_ / name, "2").exit_code, 0);
+  }
+  const auto more = [&](const std::string& name, const std::vector<std::string>& options) {
+    std::vector<std::string> arguments = {"resume", folder_ / name, "--workers", "1"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Finished finished = gapfarm_command(arguments);
+    EXPECT_EQ(finished.exit_code, 0) << finished.err;
+    return finished.out;
+  };
+  more("whole", {"--population", "9", "--generations", "5"});
+  more("parts", {"--population", "9", "--generations", "3"});
+  more("parts", {"--generations", "5"});
+  EXPECT_EQ(status_of(folder_ / "parts")["digest"], status_of(folder_ / "whole")["digest"]);
+  EXPECT_THAT(more("parts", {}), HasSubstr("completed 5 of 5 generations"));
+}
+
 TEST_F(RunFolder, WhereOneEndedAnotherBegins) {
   ASSERT_EQ(evolve(run_, "12").exit_code, 0);
   const auto begun = [&](const std::string& config, const std::string& from) {
@@ -273,7 +291,7 @@ TEST_F(RunFolder, ASecondMasterIsRefusedAndTheFirstGoesOn) {
   RunningProgram first(
       "gapfarm", {"evolve", config_, "--out", run_, "--generations", "1000000", "--workers", "1"});
   while (status_of(run_).value("generation", 0) < 1) ::poll(nullptr, 0, 10);
-  for (const Finished& second : {resume(run_, "2"), evolve(run_, "2")}) {
+  for (const Finished& second : {resume(run_, "1000000"), evolve(run_, "2")}) {
     EXPECT_EQ(second.exit_code, kRefused);
     EXPECT_THAT(second.err, AllOf(HasSubstr(run_),
                                   HasSubstr("in use by process " + std::to_string(first.pid()))));

@@ -56,24 +56,25 @@ Status check_program(const Config& config, const std::string& run) {
                "another run by `gapfarm evolve`"};
 }
 
+// An error where the run has no such generation to go on from.
+Status check_generation(const ResumeCommand& command, const std::vector<StoredGeneration>& done) {
+  const auto& asked = command.branch.generation;
+  if (!asked || contains(done, *asked, &StoredGeneration::generation)) return {};
+  const std::string last = done.empty() ? "none" : std::to_string(done.back().generation);
+  return Error{command.run + ": has no generation " + std::to_string(*asked) + ", the last is " +
+               last + "; give an earlier one to --generation"};
+}
+
 // Of the run as it is, before anything is written; what cannot be read is for others to report.
-Status check_program(const ResumeCommand& command) {
+Status check_begin(const ResumeCommand& command) {
   const auto reader = RunReader::open(command.run);
   if (!reader) return {};
   const auto config = stored_config(reader->info(), command.options.overrides);
-  return config ? check_program(*config, command.run) : Status();
-}
-
-// An error where the run has no such generation to go on from.
-Status check_generation(const ResumeCommand& command) {
-  if (!command.branch.generation) return {};
-  ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
-  ASSIGN_OR_RETURN(const auto generations, reader.generations());
-  if (contains(generations, *command.branch.generation, &StoredGeneration::generation)) return {};
-  const std::string last =
-      generations.empty() ? "none" : std::to_string(generations.back().generation);
-  return Error{command.run + ": has no generation " + std::to_string(*command.branch.generation) +
-               ", the last is " + last + "; give an earlier one to --generation"};
+  const auto done = reader->generations();
+  if (!config || !done) return {};
+  RETURN_IF_ERROR(check_generation(command, *done));
+  RETURN_IF_ERROR(under(command.run, check_runnable(*config)));
+  return check_program(*config, command.run);
 }
 
 // By its reader: a store of an older version stays as it is.
@@ -95,8 +96,8 @@ Result<int> run_branch(ResumeCommand& command, CliContext& context) {
   const std::unique_ptr<Log> log = command.options.farm.open_log();
   const NotesGoTo notes(*log, context.console);
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
-  EvolutionOverrides overrides = EvolutionOverrides::from_json(reader.info().overrides);
-  overrides.merge(command.options.overrides);
+  const auto overrides =
+      EvolutionOverrides::from_json(merged_overrides(reader.info(), command.options.overrides));
   ASSIGN_OR_RETURN(Config config, stored_config(reader.info(), overrides));
   note_changes(config, reader.info().created, context.console);
   RETURN_IF_ERROR(branch_off(reader, command.branch, config));
@@ -127,8 +128,7 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
     return Error{"--fix and --free make a run of its own and leave " + command.run +
                  " as it is; name its folder by --out"};
   }
-  RETURN_IF_ERROR(check_generation(command));
-  RETURN_IF_ERROR(check_program(command));
+  RETURN_IF_ERROR(check_begin(command));
   if (context.dry_run) return print_resume(command, context);
   const std::unique_ptr<Log> log = command.options.farm.open_log();
   const NotesGoTo notes(*log, context.console);
@@ -141,6 +141,11 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
     const auto kept = store.truncate_after(*command.branch.generation);
     if (!kept) return stopped_by(store, kept.error());
     if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
+  }
+  // Once it has begun with them they are the run's, also for whoever goes on with it next.
+  if (Status s = store.set_overrides(merged_overrides(store.info(), command.options.overrides));
+      !s) {
+    return stopped_by(store, s.error());
   }
   return run_evolution(store, *config, command.options, *log, context);
 }

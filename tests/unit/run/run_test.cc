@@ -284,10 +284,13 @@ TEST(Overrides, OutrankWhatWasStoredAndComeBackFromJson) {
   first.time_s = 1.5;
   later.generations = 9;
   later.population = 12;
-  EvolutionOverrides both = EvolutionOverrides::from_json(first.to_json());
-  both.merge(EvolutionOverrides::from_json(later.to_json()));
+  RunInfo info;
+  info.overrides = R"({"folder": "/where/it/began", "generations": 3})";
+  info.overrides = merged_overrides(info, first);
+  info.overrides = merged_overrides(info, later);
+  EXPECT_THAT(info.overrides, HasSubstr("/where/it/began"));
   EvolutionSettings settings;
-  both.apply(settings);
+  EvolutionOverrides::from_json(info.overrides).apply(settings);
   EXPECT_EQ(settings.generations, 9u);
   EXPECT_EQ(settings.time_s, 1.5);
   EXPECT_EQ(settings.population, 12u);
