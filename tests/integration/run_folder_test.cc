@@ -101,6 +101,24 @@ TEST_F(RunFolder, WhatAResumeIsGivenIsTheRunsFromThenOn) {
   EXPECT_THAT(more("parts", {}), HasSubstr("completed 5 of 5 generations"));
 }
 
+TEST_F(RunFolder, ALimitBelowWhatIsDoneIsRefused) {
+  ASSERT_EQ(evolve(run_, "3").exit_code, 0);
+  const std::string before = text_of(file_);
+  const auto refused = [&](const std::vector<std::string>& limit) {
+    const Finished tried = gapfarm_command({"resume", run_, limit[0], limit[1]});
+    EXPECT_EQ(tried.exit_code, kRefused);
+    EXPECT_EQ(text_of(file_), before);
+    return tried.err;
+  };
+  EXPECT_THAT(refused({"--generations", "2"}),
+              HasSubstr(run_ + ": --generations 2 was reached at generation 2, and generation 3 is "
+                               "done; give more, or go back by --generation 2"));
+  EXPECT_THAT(refused({"--evaluations", "7"}),
+              HasSubstr("--evaluations 7 was reached at generation 2"));
+  EXPECT_THAT(refused({"--time", "1e-9"}), HasSubstr("--time 1e-09 was reached at generation 1"));
+  EXPECT_EQ(resume(run_, "3").exit_code, 0);
+}
+
 TEST_F(RunFolder, WhereOneEndedAnotherBegins) {
   ASSERT_EQ(evolve(run_, "12").exit_code, 0);
   const auto begun = [&](const std::string& config, const std::string& from) {

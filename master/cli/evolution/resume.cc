@@ -1,4 +1,5 @@
 // gapfarm resume RUN: continue a run from its last generation, or from an earlier one.
+#include <spdlog/fmt/fmt.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -65,6 +66,29 @@ Status check_generation(const ResumeCommand& command, const std::vector<StoredGe
                last + "; give an earlier one to --generation"};
 }
 
+// An error where a limit that is given had ended the run before the generation to go on from.
+Status check_limits(const ResumeCommand& command, const std::vector<StoredGeneration>& done) {
+  if (done.empty()) return {};
+  const std::uint64_t last = command.branch.generation.value_or(done.back().generation);
+  const EvolutionOverrides& given = command.options.overrides;
+  double wall_s = 0;
+  for (const StoredGeneration& g : done) {
+    if (g.generation >= last) break;
+    wall_s += g.wall_s;
+    const auto at = [&](const char* option, const auto& limit, auto spent) {
+      if (!limit || spent < *limit) return Status();
+      return Status(Error{fmt::format(
+          "{}: --{} {} was reached at generation {}, and generation {} is done; give more, or go "
+          "back by --generation {}",
+          command.run, option, *limit, g.generation, last, g.generation)});
+    };
+    RETURN_IF_ERROR(at("generations", given.generations, g.generation));
+    RETURN_IF_ERROR(at("evaluations", given.evaluations, g.evaluations));
+    RETURN_IF_ERROR(at("time", given.time_s, wall_s));
+  }
+  return {};
+}
+
 // Of the run as it is, before anything is written; what cannot be read is for others to report.
 Status check_begin(const ResumeCommand& command) {
   const auto reader = RunReader::open(command.run);
@@ -73,6 +97,7 @@ Status check_begin(const ResumeCommand& command) {
   const auto done = reader->generations();
   if (!config || !done) return {};
   RETURN_IF_ERROR(check_generation(command, *done));
+  RETURN_IF_ERROR(check_limits(command, *done));
   RETURN_IF_ERROR(under(command.run, check_runnable(*config)));
   return check_program(*config, command.run);
 }
