@@ -78,6 +78,18 @@ bool is_store(const std::string& path) {
   return std::string_view(begin.data(), begin.size()) == "SQLite format 3";
 }
 
+// Of a run: its store and what it left; and a lock, of a run or of another long command.
+constexpr std::string_view kOfRun[] = {"run.sqlite",  "log.txt",   "model.toml",
+                                       "report.html", "poses.svg", "fitness.svg"};
+
+bool is_of_run(const std::string& path) {
+  std::error_code ignored;
+  const fs::path file = fs::weakly_canonical(path, ignored);
+  const std::string name = file.filename();
+  return name == "run.lock" ||
+         (contains(kOfRun, name) && is_there(file.parent_path() / "run.sqlite"));
+}
+
 bool is_in_place(const std::string& path) {
   std::error_code code;
   const auto status = fs::status(path, code);
@@ -133,7 +145,7 @@ void Outputs::reads_runs(const std::vector<std::string>& folders) {
   }
 }
 
-Status Outputs::check(const std::string& path, bool replace) const {
+Status Outputs::check(const std::string& path, bool replace, bool own) const {
   if (is_in_place(path)) return {};
   const auto is_this = [&](const std::string& other) { return same_file(path, other); };
   if (std::ranges::any_of(inputs_, is_this)) {
@@ -144,6 +156,11 @@ Status Outputs::check(const std::string& path, bool replace) const {
   }
   if (is_store(path)) {
     return Error{path + ": is a store of simulations, so it cannot be written; give another name"};
+  }
+  if (!own && is_of_run(path)) {
+    return Error{path +
+                 ": belongs to the run in its folder, so it cannot be written; give another "
+                 "name"};
   }
   if (std::error_code ignored; !replace && fs::exists(fs::symlink_status(path, ignored))) {
     return Error{path + ": exists already; give another name, or --force to replace it"};
@@ -160,7 +177,7 @@ Status Outputs::plan(const std::string& path) {
       return Error{path + ": is to be written twice; give one of the outputs another name"};
     }
   }
-  RETURN_IF_ERROR(check(path, force_));
+  RETURN_IF_ERROR(check(path, force_, false));
   planned_.push_back({path, force_});
   return {};
 }
@@ -182,7 +199,7 @@ Status Outputs::plan_in(const std::string& folder, const std::vector<std::string
 
 Status Outputs::plan_again(const std::string& path) {
   planned_.push_back({path, true});
-  return check(path, true);
+  return check(path, true, true);
 }
 
 Status Outputs::write(const std::string& path, std::string_view bytes) const {

@@ -30,8 +30,8 @@ class Outputs {
   void reads_runs(const std::vector<std::string>& folders);
 
   // Errors: the file is read by this command, is there already and --force was not given, is a
-  // folder, or lies where nothing can be written.  Empty and "-" (stdout) are fine.  Devices and
-  // pipes are written to as they are.
+  // folder, a run's own, or lies where nothing can be written.  Empty and "-" (stdout) are fine.
+  // Devices and pipes are written to as they are.
   Status plan(const std::string& path);
   Status plan(const std::vector<std::string>& paths);
   // Files of these names in a folder that is made for them.  Error also: a folder of another kind.
@@ -56,7 +56,7 @@ class Outputs {
     bool replace;
   };
 
-  Status check(const std::string& path, bool replace) const;
+  Status check(const std::string& path, bool replace, bool own) const;
 
   bool force_ = false;
   std::vector<std::string> inputs_;

@@ -71,8 +71,8 @@ Result<int> run_report(ReportCommand& command, CliContext& context) {
   const std::string out = command.out.empty() ? page.out.string() : command.out;
   command.outputs.reads(page.from.string());
   // Its own page is what it is there to draw again.
-  RETURN_IF_ERROR(command.out.empty() ? command.outputs.plan_again(out)
-                                      : command.outputs.plan(out));
+  const bool own = std::filesystem::path(out).lexically_normal() == page.out.lexically_normal();
+  RETURN_IF_ERROR(own ? command.outputs.plan_again(out) : command.outputs.plan(out));
   RETURN_IF_ERROR(command.outputs.plan(command.history));
   context.begun = true;
   RETURN_IF_ERROR(command.outputs.write(out, page.html));

@@ -66,6 +66,23 @@ TEST(Outputs, FindsWhatCannotBeWrittenBeforeTheWork) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / ""), {}), 1);
 }
 
+TEST(Outputs, AreNeverWhatARunKeepsOrLeft) {
+  TemporaryFolder folder;
+  CLI::App app;
+  Outputs outputs;
+  outputs.declare(app);
+  app.parse("--force");
+  for (const char* name : {"run.sqlite", "run.lock", "model.toml"}) {
+    folder.write(std::string("run/") + name, "x");
+    EXPECT_THAT(message_of(outputs.plan(folder / "run/../run/" + name)),
+                HasSubstr("belongs to the run in its folder"));
+  }
+  folder.write("run/mine.csv", "");
+  EXPECT_EQ(message_of(outputs.plan(folder / "run/mine.csv")), "");
+  folder.write("model.toml", "");
+  EXPECT_EQ(message_of(outputs.plan(folder / "model.toml")), "");
+}
+
 // What appears between looking and writing stays too, and no work is lost.
 TEST(Outputs, GivesEachItsOwnFile) {
   const TemporaryFolder folder;
