@@ -98,6 +98,7 @@ void describe(CLI::App& app, Arguments* arguments) {
   app.add_flag("--announce", arguments->announce)->group("");
   app.add_option("--process", arguments->process)->group("");
   app.add_option("--deadline", arguments->session.deadline_s)->group("");
+  refuse_wrong_values(app);
 }
 
 int complain(const Error& error, int status) {

@@ -1,6 +1,8 @@
 #include "common/usage/usage.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <regex>
@@ -21,7 +23,7 @@ std::string shown(const std::string& number) {
 std::string bounds_text(const std::string& lower, const std::string& upper) {
   const double least = std::strtod(lower.c_str(), nullptr);
   const double greatest = std::strtod(upper.c_str(), nullptr);
-  if (greatest > 1e300) return least < 0 ? "a number" : "a number of at least 0";
+  if (greatest > 1e300) return least < 0 ? "a finite number" : "a number of at least 0";
   if (is_whole(upper) && greatest > 1e15) return "a whole number of at least " + lower;
   return (is_whole(lower) ? "a whole number from " : "a number from ") + shown(lower) + " to " +
          shown(upper);
@@ -53,6 +55,12 @@ std::optional<std::string> swallowed(const CLI::App& app, const std::string& mis
            missing + " before " + name;
   }
   return {};
+}
+
+bool is_finite(const std::string& text) {
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  return *end != '\0' || std::isfinite(number);  // what is no number is CLI11's to refuse
 }
 
 // Text that roff prints as it is.
@@ -119,6 +127,29 @@ void describe_command(const CLI::App& app, const std::string& invocation, std::s
 }
 
 }  // namespace
+
+void refuse_wrong_values(CLI::App& app) {
+  for (CLI::App* sub : app.get_subcommands({})) refuse_wrong_values(*sub);
+  for (CLI::Option* option : app.get_options()) {
+    const std::string type = option->get_type_name();
+    const bool whole = type.starts_with("UINT");
+    const bool number = type.starts_with("FLOAT") || type.starts_with("SECONDS");
+    const bool may_be_empty = option->get_positional() || option->get_group().empty();
+    option->check(CLI::Validator(
+        [=, &app](const std::string& text) -> std::string {
+          if (text.empty() && !may_be_empty) return "a value is missing";
+          if (text.size() > 1 && text[0] == '-' && app.get_option_no_throw(text) != nullptr) {
+            return "a value is missing before '" + text + "'";
+          }
+          if (number && !is_finite(text)) return "Value " + text + " not in range -1e308 to 1e308";
+          errno = 0;
+          std::strtoull(text.c_str(), nullptr, 10);
+          if (!whole || (!text.starts_with("-") && errno != ERANGE)) return {};
+          return "Value " + text + " not in range 0 to 18446744073709551615";
+        },
+        ""));
+  }
+}
 
 std::string usage_sentence(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();

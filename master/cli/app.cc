@@ -1,7 +1,5 @@
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdlib>
 #include <sstream>
 
 #include "common/base/build_info.h"
@@ -34,26 +32,6 @@ void declare_json(CLI::App& app, bool* json) {
 }
 
 bool is_option(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
-
-// CLI11 takes -1 for the greatest number that there is, and what is greater for it, too; and the
-// next option for the value of one that has none.
-void refuse_wrong_values(CLI::App& app) {
-  for (CLI::App* sub : app.get_subcommands({})) refuse_wrong_values(*sub);
-  for (CLI::Option* option : app.get_options()) {
-    const bool whole = option->get_type_name().starts_with("UINT");
-    option->check(CLI::Validator(
-        [&app, whole](const std::string& text) -> std::string {
-          if (is_option(text) && app.get_option_no_throw(text) != nullptr) {
-            return "a value is missing before '" + text + "'";
-          }
-          errno = 0;
-          std::strtoull(text.c_str(), nullptr, 10);
-          if (!whole || (!text.starts_with("-") && errno != ERANGE)) return {};
-          return "Value " + text + " not in range 0 to 18446744073709551615";
-        },
-        ""));
-  }
-}
 
 // What `word` may have meant: an option of `app`, or one of its subcommands.
 std::string did_you_mean(const CLI::App& app, const std::string& word) {

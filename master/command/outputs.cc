@@ -151,7 +151,7 @@ Status Outputs::check(const std::string& path, bool replace, bool own) const {
   if (std::ranges::any_of(inputs_, is_this)) {
     return Error{path + ": is read by this command, so it cannot be written; give another name"};
   }
-  if (is_folder(path)) {
+  if (is_folder(path) || path.ends_with('/')) {
     return Error{path + ": is a folder, expected a file; give another name"};
   }
   if (is_store(path)) {

@@ -271,6 +271,23 @@ TEST(CliUsage, WrongTextExitWithTwoAndASuggestion) {
   EXPECT_EQ(nothing.out, "");
 }
 
+TEST(CliUsage, ValuesAreCheckedBeforeAnyWork) {
+  const TemporaryFolder folder;
+  const std::string config = folder.write("c.toml", demo_config(4));
+  const auto refused = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin() + 1, config);
+    const Finished finished = gapfarm_command(arguments);
+    EXPECT_EQ(finished.exit_code, 2) << finished.out;
+    return finished.err;
+  };
+  const std::string out = folder / "out";
+  EXPECT_THAT(refused({"evolve", "--target", "nan", "--out", out}),
+              HasSubstr("--target is 'nan', expected a finite number"));
+  EXPECT_THAT(refused({"evolve", "--out", ""}), HasSubstr("--out: a value is missing"));
+  EXPECT_THAT(refused({"simulate", "--out", out + "/"}), HasSubstr("expected a file"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
 TEST(CliImport, TurnsRunsIntoATrialLog) {
   const TemporaryFolder folder;
   const std::string first =

@@ -59,6 +59,7 @@ TEST(Outputs, FindsWhatCannotBeWrittenBeforeTheWork) {
   EXPECT_THAT(message_of(outputs.plan("/proc/nowhere/out.csv")), HasSubstr("cannot be written"));
   EXPECT_THAT(message_of(outputs.plan(folder / "file/out.csv")), HasSubstr("is no folder"));
   EXPECT_THAT(message_of(outputs.plan(folder / "")), HasSubstr("is a folder, expected a file"));
+  EXPECT_THAT(message_of(outputs.plan(folder / "new/")), HasSubstr("is a folder, expected a file"));
   EXPECT_EQ(message_of(outputs.plan(folder / "new/folder/out.csv")), "");
   EXPECT_EQ(message_of(outputs.plan("-")), "");
   EXPECT_EQ(message_of(outputs.plan("/dev/null")), "");

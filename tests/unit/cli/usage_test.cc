@@ -39,6 +39,12 @@ TEST(Usage, ReportsWhatWasFoundAndWhatWasExpected) {
   EXPECT_EQ(with("--seed", "18446744073709551615"), "no error");
   EXPECT_EQ(with("--target", "high"), "--target is 'high', expected a number");
   EXPECT_EQ(with("--time", "-3"), "--time is '-3', expected a number greater than 0");
+  EXPECT_EQ(with("--target", "nan"), "--target is 'nan', expected a finite number");
+  EXPECT_EQ(with("--time", "nan"), "--time is 'nan', expected a finite number");
+  EXPECT_EQ(sentence_of({"simulate", "c.toml", "--out", "x", "--levels", "0.5", "nan"}),
+            "--levels is 'nan', expected a finite number");
+  EXPECT_THAT(sentence_of({"workers", "--connect", "ipc://x", "--wait-limit", "nan"}),
+              HasSubstr("--wait-limit is 'nan', expected a finite number"));
   // Nothing would be done.
   EXPECT_EQ(with("--generations", "0"),
             "--generations is '0', expected a whole number of at least 1");
@@ -53,6 +59,7 @@ TEST(Usage, NamesTheOptionThatTookTheConfig) {
 }
 
 TEST(Usage, NoOptionIsTheValueOfAnother) {
+  EXPECT_EQ(sentence_of({"evolve", "c.toml", "--out", ""}), "--out: a value is missing");
   EXPECT_EQ(sentence_of({"evolve", "c.toml", "--trials", "--out", "x"}),
             "--trials: a value is missing before '--out'");
   EXPECT_EQ(sentence_of({"evolve", "c.toml", "--out", "--seed"}),
