@@ -10,7 +10,8 @@ constexpr std::size_t kShown = 80;
 static bool is_control(char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }
 
 std::string shown(const std::string& text) {
-  std::string beginning = text.substr(0, kShown);
+  // What json_text() makes of bytes that are not UTF-8 can be read again.
+  auto beginning = parse_json(json_text(Json(text.substr(0, kShown)))).get<std::string>();
   std::ranges::replace_if(beginning, is_control, '?');
   return "'" + beginning + (text.size() > kShown ? "...'" : "'");
 }

@@ -8,7 +8,8 @@
 
 namespace gapfarm::line_json {
 
-// The beginning of what a program printed, quoted, with control bytes as '?'.
+// The beginning of what a program printed, quoted, with control bytes as '?' and what is not
+// UTF-8 as U+FFFD.
 std::string shown(const std::string& text);
 
 // `what`, and the line as shown().

@@ -28,6 +28,7 @@ constexpr const char* kMass =
 
 TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
   EXPECT_THAT(error_of("hello"), HasSubstr("JSON object"));
+  EXPECT_THAT(error_of("caf\xe9 here"), HasSubstr("'caf\uFFFD here'"));
   EXPECT_THAT(error_of(R"({"gapfarm": 2})"), HasSubstr("does not speak protocol 1"));
   EXPECT_THAT(error_of(declaration_with(std::string(kMass) + "," + kMass)), HasSubstr("twice"));
   EXPECT_THAT(error_of(declaration_with(R"({"key": "a b"})")), HasSubstr("'a b' needs a key"));
