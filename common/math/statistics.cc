@@ -120,9 +120,8 @@ std::vector<double> holm(std::span<const double> p_values) {
 }
 
 double first_order_index(std::span<const double> x, std::span<const double> y) {
-  assert(x.size() == y.size());
   const std::size_t n = x.size();
-  if (n < kLeastForImportance) return 0;
+  assert(n == y.size() && n >= kLeastForImportance);
   const std::vector<std::size_t> order = order_of(x);
   const std::vector<double> sorted = mapped(order, [&](std::size_t i) { return y[i]; });
   const double whole = squares_about_mean(sorted);

@@ -68,9 +68,9 @@ inline constexpr std::size_t kLeastForImportance = 40;  // points
 // the variance of y's mean given x over y's variance, from given data by classes of x with as many
 // points each (Plischke, Borgonovo and Smith, European Journal of Operational Research 226, 2013),
 // no class splitting equal x, less what chance alone would give (as adjusted R squared).  In [0,
-// 1]; 0 of fewer than kLeastForImportance points, and where y does not vary.  What x does together
+// 1]; 0 where y does not vary.  What x does together
 // with another input does not count, and where inputs go together, each has the share of both.
-// REQUIRES: as many x as y.
+// REQUIRES: as many x as y, kLeastForImportance at least.
 double first_order_index(std::span<const double> x, std::span<const double> y);
 
 }  // namespace gapfarm

@@ -155,6 +155,7 @@ RunSample run_sample(const Problem& problem, const std::vector<StoredIndividual>
     RunSample::GeneShare& share = sample.genes.emplace_back(RunSample::GeneShare{
         p.key, p.unit, gene.lower, gene.upper, gene.scale == ParameterScale::kLog, {}});
     const auto values = mapped(whole, [&](const auto* one) { return one->genome[g]; });
+    if (whole.size() < kLeastForImportance) continue;
     share.importance =
         mapped(ranks, [&](const auto& output) { return first_order_index(values, output); });
   }

@@ -109,9 +109,10 @@ class Run:
     @property
     def importance(self) -> pd.DataFrame:
         """A row a parameter, a column the fitness or each objective: the share of its variance that
-        the parameter explains alone, [0, 1] without a unit, among what was evaluated (docs/page.md)."""
+        the parameter explains alone, [0, 1] without a unit, among what was evaluated (docs/page.md);
+        NaN where that was too little."""
         found = command(["report", self.folder, "--out", os.devnull]).get("importance", {})
-        return pd.DataFrame.from_dict(found, orient="index")
+        return pd.DataFrame.from_dict(found, orient="index", dtype=float)
 
     def genomes(self, generation: Optional[int] = None) -> npt.NDArray[np.float64]:
         """float64 of shape (individuals, genes), values in [0, 1], best first."""

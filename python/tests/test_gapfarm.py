@@ -64,7 +64,7 @@ def test_individuals_have_parameters_and_genomes(run):
 
 def test_importance_has_a_row_a_gene(run):
     assert run.importance.shape == (7, 1)
-    assert run.importance.loc["friction"].between(0, 1).all()
+    assert run.importance.isna().all().all()  # 24 evaluations show too little
 
 
 def test_the_model_holds_the_best(run):

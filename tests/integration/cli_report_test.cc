@@ -63,6 +63,8 @@ TEST_F(CliReport, ARunLeavesAPageThatIsMadeAgainFromItsStoreAlone) {
   std::filesystem::remove(file);
   const Finished again = report(run_);
   EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.err,
+              HasSubstr("explained by each alone: not known (6 evaluations, 40 needed)"));
   EXPECT_EQ(without_farm(text_of(folder_ / "page.html")), without_farm(page));
 }
 

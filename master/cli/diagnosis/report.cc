@@ -1,6 +1,9 @@
 // gapfarm report RUN|DIAGNOSIS: the page of a run or of a diagnosis, from what they keep alone.
+#include <spdlog/fmt/fmt.h>
+
 #include <nlohmann/json.hpp>
 
+#include "common/math/statistics.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
@@ -24,10 +27,15 @@ struct Page {
   std::filesystem::path from;  // what was read
   std::filesystem::path out;   // where it goes unless configured otherwise
   Json importance = {};        // of a run's parameters
+  std::size_t evaluations = 0;
 };
 
 // "fitness, explained by each alone: friction 0.42, full_speed 0.1"
-std::string importance_text(const nlohmann::ordered_json& importance) {
+std::string importance_text(const nlohmann::ordered_json& importance, std::size_t evaluations) {
+  if (evaluations < kLeastForImportance) {
+    return fmt::format("explained by each alone: not known ({} evaluations, {} needed)",
+                       evaluations, kLeastForImportance);
+  }
   std::string text;
   for (const auto& [output, ignored] : importance.begin().value().items()) {
     text += (text.empty() ? "" : "; ") + output + ", explained by each alone:";
@@ -50,10 +58,12 @@ Result<Page> page_of_run(const std::filesystem::path& run) {
   ASSIGN_OR_RETURN(const auto report, read_run_report({run, {}, {}}));
   Page page{run_html(report), run / "run.sqlite", run / "report.html"};
   for (const RunSample::GeneShare& gene : report.sample.genes) {
-    for (std::size_t i = 0; i < gene.importance.size(); ++i) {
-      page.importance[gene.key][report.sample.outputs[i]] = gene.importance[i];
+    for (std::size_t i = 0; i < report.sample.outputs.size(); ++i) {
+      Json& share = page.importance[gene.key][report.sample.outputs[i]];
+      if (!gene.importance.empty()) share = gene.importance[i];
     }
   }
+  page.evaluations = report.sample.evaluated.size();
   return page;
 }
 
@@ -86,7 +96,9 @@ Result<int> run_report(ReportCommand& command, CliContext& context) {
     json["history"] = command.history;
   }
   if (!page.importance.empty()) json["importance"] = page.importance;
-  if (!page.importance.empty()) context.console.note(importance_text(page.importance));
+  if (!page.importance.empty()) {
+    context.console.note(importance_text(page.importance, page.evaluations));
+  }
   context.console.result(text, json);
   return kExitDone;
 }

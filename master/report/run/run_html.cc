@@ -42,7 +42,7 @@ std::string front_section(const RunReport& report) {
 std::string understanding_section(const RunReport& report) {
   if (report.sample.evaluated.size() < 2) return "";
   std::string html =
-      R"(<section id="understanding"><h2>What the parameters do</h2><p>The share of the variance that each parameter explains alone, among what was evaluated: first-order Sobol indices from given data, on ranks (Plischke, Borgonovo and Smith 2013). They hold where the search was, not over the whole ranges; what parameters do together does not count, and parameters that moved together share what one of them does. Shares of fewer than 40 evaluations are not known and stand as 0.</p><div id="importance-table" data-live>)";
+      R"(<section id="understanding"><h2>What the parameters do</h2><p>The share of the variance that each parameter explains alone, among what was evaluated: first-order Sobol indices from given data, on ranks (Plischke, Borgonovo and Smith 2013). They hold where the search was, not over the whole ranges; what parameters do together does not count, and parameters that moved together share what one of them does. Shares of fewer than 40 evaluations are not known.</p><div id="importance-table" data-live>)";
   std::vector<HtmlColumn> columns = {{"parameter"}};
   for (const std::string& output : report.sample.outputs) {
     columns.push_back({html_escaped(output) + ", %", "number", html_escaped(output)});
@@ -52,6 +52,7 @@ std::string understanding_section(const RunReport& report) {
     HtmlRow& row = rows.emplace_back(HtmlRow{html_escaped(gene.key), {}});
     for (const double share : gene.importance)
       row.cells.push_back(fmt::format("{:.0f}", 100 * share));
+    row.cells.resize(report.sample.outputs.size(), "–");
   }
   return html + html_table("parts", "importance", "Importance of the parameters", columns, rows) +
          "</div>" + plot_area("contour") + "</section>\n";

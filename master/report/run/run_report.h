@@ -85,7 +85,7 @@ struct RunSample {
     std::string key, unit;
     double lower = 0, upper = 0;
     bool log = false;                // searched by its logarithm
-    std::vector<double> importance;  // one each of `outputs`, [0, 1]
+    std::vector<double> importance;  // one each of `outputs`, [0, 1]; none of too few evaluations
   };
   std::vector<std::string> outputs;  // the fitness, or several objectives
   std::vector<GeneShare> genes;
