@@ -42,12 +42,12 @@ Status make_master(const KeyFolder& folder, Console& console) {
 }
 
 Result<int> run_make(const KeysOptions& options, CliContext& context) {
-  context.begun = true;
   Console& console = context.console;
   ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open_or_make(options.folder));
   if (folder.has_pair("worker")) console.note("worker.key is there already and stays");
   ASSIGN_OR_RETURN(const KeyPair worker,
                    worker_pair(folder, options.name.empty() ? key_name_of_host() : options.name));
+  context.begun = true;
   if (options.worker_only) {
     console.result("made the key of worker '" + worker.name + "' in " + folder.path() +
                        "\nput master.pub of the master's key folder there, and list the worker on "
@@ -67,11 +67,11 @@ Result<int> run_make(const KeysOptions& options, CliContext& context) {
 
 // Key folder of a worker elsewhere, made here.
 Result<int> run_worker(const KeysOptions& options, CliContext& context) {
-  context.begun = true;
   ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
   ASSIGN_OR_RETURN(const PublicKey master, folder.master_public());
   ASSIGN_OR_RETURN(const KeyFolder other, KeyFolder::open_or_make(options.out));
   ASSIGN_OR_RETURN(const KeyPair worker, worker_pair(other, options.name));
+  context.begun = true;
   RETURN_IF_ERROR(other.add_master_public(master));
   RETURN_IF_ERROR(folder.list({options.name, worker.public_key}));
   context.console.result(
@@ -85,7 +85,6 @@ Result<int> run_allow(const KeysOptions& options, CliContext& context) {
   if (options.file.empty() == options.key.empty()) {
     return Error{"give either the worker's public key file or --key KEY"};
   }
-  context.begun = true;
   ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
   PublicKey key{options.name, options.key};
   if (!options.file.empty()) {
@@ -99,7 +98,6 @@ Result<int> run_allow(const KeysOptions& options, CliContext& context) {
 }
 
 Result<int> run_revoke(const KeysOptions& options, CliContext& context) {
-  context.begun = true;
   ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
   RETURN_IF_ERROR(folder.unlist(options.name));
   context.console.result("worker '" + options.name +
@@ -110,7 +108,6 @@ Result<int> run_revoke(const KeysOptions& options, CliContext& context) {
 }
 
 Result<int> run_list(const KeysOptions& options, CliContext& context) {
-  context.begun = true;
   ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
   Json rows = Json::array();
   std::vector<std::string> trouble;
