@@ -182,9 +182,25 @@ void read_paths_beside(std::vector<Part>& parts, TrialLog& log, Mistakes& mistak
   }
 }
 
-void name_sessions(Part& part) {
-  for (Trial& trial : part.log.trials) {
-    trial.session = session_of(part.file) + "/" + trial.session;
+// By the end of each file's path that no other has: its name, mostly.
+void name_sessions(std::vector<Part>& parts) {
+  std::vector<fs::path> names, above;
+  for (const Part& part : parts) {
+    names.emplace_back(session_of(part.file));
+    above.push_back(fs::absolute(part.file).lexically_normal().parent_path());
+  }
+  for (bool changed = true; changed;) {
+    changed = false;
+    const std::vector<fs::path> before = names;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (std::ranges::count(before, before[i]) < 2 || !above[i].has_filename()) continue;
+      names[i] = above[i].filename() / names[i];
+      above[i] = above[i].parent_path();
+      changed = true;
+    }
+  }
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (Trial& t : parts[i].log.trials) t.session = names[i].string() + "/" + t.session;
   }
 }
 
@@ -255,7 +271,7 @@ Result<TrialLog> read_trial_files(std::span<const std::string> paths,
     add_file(file, all, add_paths, log.files, mistakes);
   }
   RETURN_IF_ERROR(mistakes.status());
-  if (options.name_sessions) std::for_each(parts.begin(), parts.end(), name_sessions);
+  if (options.name_sessions) name_sessions(parts);
   RETURN_IF_ERROR(join(std::move(parts), log));
   return finished(std::move(log), mistakes);
 }

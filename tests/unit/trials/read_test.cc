@@ -355,6 +355,16 @@ TEST(ReadFiles, PutsTheFilesNamesBeforeTheirSessions) {
   EXPECT_TRUE(log->trials[0].path.empty());
   EXPECT_EQ(log->trials[1].session, "tuesday/s1");
   EXPECT_EQ(log->trials[1].path.size(), 1u);
+
+  const std::vector<std::string> alike = {files[0],
+                                          folder.write("a/s.csv", kHeader + "\n" + kRow + "\n"),
+                                          folder.write("b/s.csv", kHeader + "\n" + kRow + "\n")};
+  options.paths.clear();
+  const auto both = read_trial_files(alike, kCommands, options);
+  ASSERT_TRUE(both.ok()) << both.error().message;
+  EXPECT_EQ(both->trials[0].session, "monday/s1");
+  EXPECT_EQ(both->trials[1].session, "a/s/s1");
+  EXPECT_EQ(both->trials[2].session, "b/s/s1");
 }
 
 TEST(ReadFiles, RefusesWhatCannotBeOneLog) {
