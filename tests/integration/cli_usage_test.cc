@@ -291,6 +291,9 @@ TEST(CliUsage, ValuesAreCheckedBeforeAnyWork) {
     return finished.err;
   };
   const std::string out = folder / "out";
+  EXPECT_THAT(refused({"plan", "--levels", "0", "--out", out}),
+              HasSubstr("--levels is '0', expected a number from 0.001 to 1"));
+  EXPECT_THAT(refused({"plan", "--durations", "0", "--out", out}), HasSubstr("--durations is '0'"));
   EXPECT_THAT(refused({"evolve", "--target", "nan", "--out", out}),
               HasSubstr("--target is 'nan', expected a finite number"));
   EXPECT_THAT(refused({"evolve", "--out", ""}), HasSubstr("--out: a value is missing"));

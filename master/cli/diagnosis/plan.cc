@@ -192,8 +192,8 @@ SubcommandRun setup_plan(CLI::App& app) {
   app.add_option("--chain", options->chain, "Trials before the robot is put down anew")
       ->check(CLI::Range(1, 1000));
   app.add_option("--levels", options->levels, "Factors of the commands' duties")
-      ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--durations", options->durations, "s")->check(CLI::Range(0.0, 60.0));
+      ->check(CLI::Range(0.001, 1.0));
+  app.add_option("--durations", options->durations, "s")->check(CLI::Range(0.001, 60.0));
   app.add_option("--pool", options->settings.pool, "Chains to choose each one from")
       ->check(CLI::Range(2, 100));
   app.add_option("--seed", options->settings.seed, "Of the chains to choose from");

@@ -141,8 +141,8 @@ SubcommandRun setup_simulate(CLI::App& app) {
   app.add_option("--chain", options->chain, "Trials between unrecorded moves")
       ->check(CLI::Range(1, 100000));
   app.add_option("--levels", options->levels, "Factors of the commands' duties")
-      ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--durations", options->durations, "s")->check(CLI::Range(0.0, 60.0));
+      ->check(CLI::Range(0.001, 1.0));
+  app.add_option("--durations", options->durations, "s")->check(CLI::Range(0.001, 60.0));
   app.add_option("--commands", options->commands, "Only these commands");
   app.add_option("--paths", options->path_interval_s, "s between samples of paths.csv; 0: none")
       ->check(CLI::Range(0.0, 10.0));
