@@ -146,5 +146,29 @@ TEST(FrictionPatch, HasIntervalsOfWhatCanBe) {
   EXPECT_GT(found->parameters[3].lo, 0);
 }
 
+// Held out with the one run that comes upon it, a patch shows nothing; that nothing is wrong it
+// does not say either.
+TEST(FrictionPatch, ThatOneRunAloneCrossesIsNotNothing) {
+  const RunLog even = driven_on_slope(0, 0, 1, {{100, 100}, 0.1, 0.8});
+  Patch patch{{0, 0}, 0.5, 0.8};
+  double farthest_m = 0;  // of the second run's ways from all others
+  for (const PoseRow& row : even.runs[1].poses) {
+    const Eigen::Vector2d at(row.X_WM.x, row.X_WM.y);
+    double nearest_m = INFINITY;
+    for (const LoggedRun& run : even.runs) {
+      if (run.run == even.runs[1].run) continue;
+      for (const PoseRow& other : run.poses) {
+        nearest_m = std::min(nearest_m, (Eigen::Vector2d(other.X_WM.x, other.X_WM.y) - at).norm());
+      }
+    }
+    if (nearest_m > farthest_m) patch.middle_m = at;
+    farthest_m = std::max(farthest_m, nearest_m);
+  }
+  ASSERT_GT(farthest_m, 1);
+  const Diagnosis d = diagnosed_slope(driven_on_slope(0, 0, 1, patch));
+  EXPECT_EQ(d.verdict, Verdict::kUnknown) << d.headline;
+  EXPECT_NE(d.headline.find("bears it out"), std::string::npos) << d.headline;
+}
+
 }  // namespace
 }  // namespace gapfarm
