@@ -139,22 +139,6 @@ std::string far_windows(const WindowFitter& fitter, const GroundSearch& search,
   return text;
 }
 
-// A part of the floor that explains more than the best of many places does by chance, of runs that
-// were fitted; empty: none, or it is named.
-std::string unconfirmed_part(const GroundSearch& search) {
-  if (search.offers.empty() || search.reference) return "";
-  for (const Offer& offer : search.offers.back()) {
-    const GroundHypothesis& h = search.catalogue[offer.hypothesis];
-    const bool named = contains(search.steps, offer.hypothesis, &GroundStep::chosen);
-    if (h.price == 0 || named || offer.gain < kLeastSecondOfAKind) continue;
-    return fmt::format(
-        "Where all runs are fitted, {} explains {:.0f} nats, but no run that was held out bears it "
-        "out: one run alone was there, or something comes and goes. Log more runs over it.",
-        h.thing, offer.gain);
-  }
-  return "";
-}
-
 }  // namespace
 
 Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog& log,
@@ -267,13 +251,24 @@ std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
                               search.log.runs[r].run, times,
                               has_own ? ", and other values fit it" : ""));
   }
-  if (far.empty()) {
-    const std::string windows_text = far_windows(fitter, search, missed);
-    return windows_text.empty() ? unconfirmed_part(search) : windows_text;
-  }
+  if (far.empty()) return far_windows(fitter, search, missed);
   return joined(far, " ") +
          " Look at the commands and the poses of these: another run's, the other way round, or "
          "something that happened there alone.";
+}
+
+std::string unconfirmed_part(const GroundSearch& search) {
+  if (search.offers.empty() || search.reference) return "";
+  for (const Offer& offer : search.offers.back()) {
+    const GroundHypothesis& h = search.catalogue[offer.hypothesis];
+    const bool named = contains(search.steps, offer.hypothesis, &GroundStep::chosen);
+    if (h.price == 0 || named || offer.gain < kLeastSecondOfAKind) continue;
+    return fmt::format(
+        "Where all runs are fitted, {} explains {:.0f} nats, but no run that was held out bears it "
+        "out: one run alone was there, or something comes and goes. Log more runs over it.",
+        h.thing, offer.gain);
+  }
+  return "";
 }
 
 double share_unexplained(const WindowFitter& fitter, const WindowFit& fit) {

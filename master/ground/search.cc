@@ -220,12 +220,12 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   std::vector<Candidate> tried;
   const std::vector<Eigen::MatrixXd> slopes = fitter.slopes(search->fit);
   for (std::size_t i = 0; i < search->catalogue.size(); ++i) {
+    if (search->catalogue[i].put_right || chosen_before(*search, i)) continue;
     if (work.stopped && work.stopped()) return false;
     if (work.on_progress) {
       const std::size_t before = search->steps.size() * search->catalogue.size();
       work.on_progress(before + i, before + search->catalogue.size());
     }
-    if (search->catalogue[i].put_right || chosen_before(*search, i)) continue;
     tried.push_back(try_one(fitter, *search, slopes, i));
     emit_offers(work, *search, mapped(tried, &Candidate::offer));
   }

@@ -166,10 +166,12 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
 // Of three runs or more those whose windows miss by far more than the others' (kFarRun), medians
 // of each, and those that values of their own fit as much better as a fault is worth: commands of
 // another run, a world that is mirrored in this one alone, a wheel that slips.  Of windows many
-// (kFarShare) that do: what comes and goes, as commands that did not arrive; or a part of the floor
-// that explains much of what was fitted and nothing of what was not.  "Run 3 misses by
+// (kFarShare) that do: what comes and goes, as commands that did not arrive.  "Run 3 misses by
 // 12.0 times as much as the others.", one sentence a run, and what to look at; empty: none.
 std::string far_runs(const WindowFitter& fitter, const GroundSearch& search);
+// A part of the floor that explains more than the best of many places does by chance, of runs that
+// were fitted, and has no name: a sentence; empty: none.
+std::string unconfirmed_part(const GroundSearch& search);
 
 // How much of what motions differ by a fit leaves, mean absolute values, of the component of the
 // ends that it explains best: near 1 where commands have nothing to do with how the robot moved.

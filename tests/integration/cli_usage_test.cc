@@ -271,16 +271,6 @@ TEST(CliUsage, WrongTextExitWithTwoAndASuggestion) {
   EXPECT_EQ(nothing.out, "");
 }
 
-TEST(CliUsage, KeysThatCannotBeAreWrongInput) {
-  const TemporaryFolder folder;
-  const std::string keys = folder / "keys", file = folder.write("file", "");
-  ASSERT_EQ(gapfarm_command({"keys", "make", "--keys", keys}).exit_code, 0);
-  EXPECT_EQ(gapfarm_command({"keys", "list", "--keys", folder / "none"}).exit_code, 2);
-  EXPECT_EQ(gapfarm_command({"keys", "revoke", "rack9", "--keys", keys}).exit_code, 2);
-  EXPECT_EQ(gapfarm_command({"keys", "make", "--keys", file}).exit_code, 2);
-  EXPECT_EQ(gapfarm_command({"keys", "make", "--keys", "/proc/nowhere"}).exit_code, 2);
-}
-
 TEST(CliUsage, ValuesAreCheckedBeforeAnyWork) {
   const TemporaryFolder folder;
   const std::string config = folder.write("c.toml", demo_config(4));

@@ -246,4 +246,14 @@ TEST_F(Hostile, ARunUnderAttackEndsAsIfNobodyHadBeenThere) {
   EXPECT_EQ(digest("hostile"), digest("calm"));
 }
 
+TEST(Keys, ThatCannotBeAreWrongInput) {
+  const TemporaryFolder folder;
+  const std::string keys = folder / "keys", file = folder.write("file", "");
+  ASSERT_EQ(gapfarm_command({"keys", "make", "--keys", keys}).exit_code, 0);
+  EXPECT_EQ(gapfarm_command({"keys", "list", "--keys", folder / "none"}).exit_code, 2);
+  EXPECT_EQ(gapfarm_command({"keys", "revoke", "rack9", "--keys", keys}).exit_code, 2);
+  EXPECT_EQ(gapfarm_command({"keys", "make", "--keys", file}).exit_code, 2);
+  EXPECT_EQ(gapfarm_command({"keys", "make", "--keys", "/proc/nowhere"}).exit_code, 2);
+}
+
 }  // namespace gapfarm::hostile_test

@@ -1,7 +1,6 @@
 // gapfarm horizons RUN|CONFIG: how far off a ground robot's simulation is at several horizons.
 #include "master/ground/horizons.h"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/trials/text/csv.h"
@@ -21,11 +20,6 @@ struct HorizonsCommand : LongOptions {
 
 Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
-  for (const double horizon_s : command.horizons) {
-    if (std::isfinite(horizon_s) && horizon_s >= 0) continue;
-    return Error{"--horizons: found " + format_double(horizon_s) +
-                 ", expected lengths of windows in s, or 0 for whole runs"};
-  }
   ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, command.runs, console));
   command.outputs.reads(command.source);
   command.outputs.reads(fitted.robot_path);
@@ -69,6 +63,7 @@ SubcommandRun setup_horizons(CLI::App& app) {
   app.add_option("--trials", command->runs,
                  "Folders with commands.csv and poses.csv (default: those that were fitted to)");
   app.add_option("--horizons", command->horizons, "Lengths of windows, s; 0: whole runs")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--picture", command->picture,
                  "Draw the runs: logged, as simulated before and after the fit (SVG)");

@@ -213,6 +213,7 @@ class GroundReport {
     figures_.far_runs = far_runs(fitter_, search_);
     figures_.unexplained = search_.unexplained;
     figures_.stood = hardly_moved(search_.log);
+    if (nothing_is_left(figures_)) figures_.far_runs = unconfirmed_part(search_);
     d_.verdict = ground_verdict(figures_);
     d_.findings.push_back(verdict_reason(figures_));
     if (!search_.stand_ins.empty()) d_.findings.push_back(nearest_of_catalogue(search_));
