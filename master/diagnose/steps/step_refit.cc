@@ -160,6 +160,17 @@ Result<Refit> with_correction(const DiagnosisRequest& of, Refit refit,
   return refit;
 }
 
+// What bends the view may have ended where it does no more than a sheared picture does.
+std::optional<Worthless> out_of_range(const DiagnosisRequest& of, const Explanation& named) {
+  for (std::size_t k = 0; k < named.chosen.size(); ++k) {
+    const std::string& name = named.chosen[k].effect();
+    if (!of.subject.effects->row(name).bends_view) continue;
+    const auto why = at_its_bound(of, name, named.estimates->at);
+    if (why) return Worthless{k, why->substr(name.size())};
+  }
+  return std::nullopt;
+}
+
 // Nor is anything left to explain beside it; of a robot of another kind there is.
 bool explains_bounds(const Refit& refit) {
   const Explanation& named = refit.judged.named;
@@ -235,6 +246,10 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
       if (!named.chosen.empty()) {
         ASSIGN_OR_RETURN(auto fit, estimate_beside(of, named, refit.nested.back()));
         named.estimates = std::move(fit);
+        if (const auto beyond = out_of_range(of, named)) {
+          refit.judged = dropped(std::move(refit.judged), *beyond);
+          continue;
+        }
       }
       if (named.chosen.size() < found) {
         refit.judged = judge_again(*screening.catalogue, std::move(refit.judged));
