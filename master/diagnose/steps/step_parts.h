@@ -95,7 +95,8 @@ struct Worthless {
 std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<NestedFit>& nested,
                                    std::optional<double> perfect);
 Judgement dropped(Judgement judged, const Worthless& effect);
-// Why an effect of these values is no cause: its best size is more than there can be.
+// Why an effect of these values is no cause: its best size is more than there can be, or the middle
+// of a lens lies where it does no more than a sheared picture does.
 std::optional<std::string> at_its_bound(const DiagnosisRequest& of, const std::string& effect,
                                         const Overrides& at);
 
