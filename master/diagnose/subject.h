@@ -42,7 +42,6 @@ struct DiagnosisSubject {
   double least_gain;
   // Standard deviations beyond which a trial that nothing smooth explains counts no more; 0: none.
   double farthest;
-  double noise_tail;  // of refit_drive_noise()
   // Steps a second that do for a fit's derivatives; 0: the problem's own.  Its residuals are always
   // the problem's own.
   double slope_rate_hz = 0;

@@ -63,7 +63,6 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
   s.effects = &drive_effect_diagnoses();
   s.least_gain = kLeastGainOfDrives;
   s.farthest = 0;  // slips are looked for
-  s.noise_tail = 1;
   s.base_moves = false;
   s.drive_common = {table.row("drive_noise_common")};
   s.drive_side = {table.row("drive_noise_side")};

@@ -162,8 +162,8 @@ inline constexpr double kHeavyHeading = 3.9;
 // nats | chosen: Gaussian residuals stay below 6, 155 drives of a real robot gain 13 | That two
 // tail weights must gain.
 inline constexpr double kLeastTailGain = 10;
-// - | round | Tail of the noise among free commands: no cell's spread holds it there.
-inline constexpr double kFreeNoiseTail = 7;
+// - | derived: 4 degrees of freedom in 3 dimensions; below 3 no density | Tail of the noise.
+inline constexpr double kNoiseTail = 7;
 // s.d. of a chi-squared | round | From here on a spread is there.
 inline constexpr double kClearlyThere = 4.5;
 // squared s.d. | derived: chi-squared of 3 degrees, one in 340 | Beyond it a trial pulls as the

@@ -111,10 +111,8 @@ std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
     rich.add(blocks[best].columns);
   }
   const std::vector<Eigen::Vector3d> residuals = study->unwhiten(studentised(rich, 0.1));
-  NoiseEstimate noise =
-      refit_drive_noise(study->trials, residuals, study->noise, !study->reading_noise_known,
-                        study->subject->covariance,
-                        study->free_commands ? kFreeNoiseTail : study->subject->noise_tail);
+  NoiseEstimate noise = refit_drive_noise(study->trials, residuals, study->noise,
+                                          !study->reading_noise_known, study->subject->covariance);
   noise.drive_common = std::max(noise.drive_common, kLeastDriveNoise);
   noise.drive_side = std::max(noise.drive_side, kLeastDriveNoise);
   study->noise = noise;
@@ -193,8 +191,8 @@ double perfect_score(std::span<const ResidualTrial> trials, const NoiseEstimate&
 
 NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
                                 std::span<const Eigen::Vector3d> residuals,
-                                const NoiseEstimate& start, bool fit_pose, CovarianceOf covariance,
-                                double tail) {
+                                const NoiseEstimate& start, bool fit_pose,
+                                CovarianceOf covariance) {
   const auto nats = [&](const NoiseEstimate& noise) {
     double sum = 0;
     for (std::size_t i = 0; i < trials.size(); ++i) {
@@ -202,7 +200,7 @@ NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
       const double d2 = residuals[i].dot(cov.inverse() * residuals[i]);
       const double bounded =
           d2 > kTailFromSquared
-              ? kTailFromSquared + tail * std::log1p((d2 - kTailFromSquared) / tail)
+              ? kTailFromSquared + kNoiseTail * std::log1p((d2 - kTailFromSquared) / kNoiseTail)
               : d2;
       sum -= 0.5 * (std::log(cov.determinant()) + bounded);
     }

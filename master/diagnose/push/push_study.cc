@@ -227,7 +227,6 @@ DiagnosisSubject push_subject() {
   s.effects = &push_effect_diagnoses();
   s.least_gain = kLeastGainOfPushes;
   s.farthest = 4;
-  s.noise_tail = 7;
   s.base_moves = true;
   s.drive_common = {row_of(Push::kPushNoiseSlide)};
   s.drive_side = {row_of(Push::kPushNoiseTurn), kTurnUnit_rad_m};
