@@ -97,20 +97,28 @@ std::vector<Feature> in_each_piece(const Study& study, const std::vector<Feature
   return all;
 }
 
-// Retuning in one session and not in another, and offsets of its own.
-CovariateBlock sessions_block(const Study& study) {
-  std::vector<Eigen::VectorXd> columns;
-  for (std::size_t s = 1; s < study.sessions; ++s) {
-    const Feature here = [s](const ResidualTrial& t) { return t.session == s ? 1.0 : 0.0; };
-    const Eigen::MatrixXd offsets = block(study, "", {here}).columns;
-    for (Eigen::Index k = 0; k < offsets.cols(); ++k) columns.push_back(offsets.col(k));
+// Offsets and retuning that go with features: what changes from session to session, or meanwhile.
+CovariateBlock retuned_block(const Study& study, const std::string& name,
+                             const std::vector<Feature>& features) {
+  const Eigen::MatrixXd offsets = block(study, name, features).columns;
+  std::vector<Eigen::VectorXd> columns(offsets.colwise().begin(), offsets.colwise().end());
+  for (const Feature& feature : features) {
     for (const RetunedPush& retuned : study.retuned) {
       std::vector<Eigen::Vector3d> d = retuned.slopes;
-      for (std::size_t i = 0; i < d.size(); ++i) d[i] *= here(study.trials[i]);
+      for (std::size_t i = 0; i < d.size(); ++i) d[i] *= feature(study.trials[i]);
       columns.push_back(study.whiten(d));
     }
   }
-  return {"session", stack(columns)};
+  return {name, stack(columns)};
+}
+
+// Of all but the first.
+std::vector<Feature> later_sessions(const Study& study) {
+  std::vector<Feature> all;
+  for (std::size_t s = 1; s < study.sessions; ++s) {
+    all.push_back([s](const ResidualTrial& t) { return t.session == s ? 1.0 : 0.0; });
+  }
+  return all;
 }
 
 std::string pushes_of(const std::string& piece) {
@@ -255,8 +263,10 @@ std::vector<CovariateBlock> push_blocks(const Study& study) {
       readings(study),
       block(study, "distance slid", powers(slid, 2)),
       block(study, "finger speed", powers(speed, 2)),
-      block(study, "order of the pushes", powers(order, 2))};
-  if (study.sessions > 1 && study.sessions <= 8) blocks.push_back(sessions_block(study));
+      retuned_block(study, "order of the pushes", powers(order, 2))};
+  if (study.sessions > 1 && study.sessions <= 8) {
+    blocks.push_back(retuned_block(study, "session", later_sessions(study)));
+  }
   return blocks;
 }
 
