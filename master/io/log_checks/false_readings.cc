@@ -201,19 +201,18 @@ class Drives {
   std::vector<bool> moved_;  // where it begins is not where the one before ends
 };
 
-// Beyond this distance trials are like no other: few, and far away from the next.
-double farthest_of_others(std::vector<double> distances) {
+}  // namespace
+
+double farthest_of_others(std::vector<double> distances, double usual) {
   std::ranges::sort(distances, std::greater<>());
   const std::size_t most = std::max<std::size_t>(1, distances.size() / kOfWhichAlone);
   double limit = INFINITY;
   for (std::size_t k = 0; k < most && k + 1 < distances.size(); ++k) {
-    const double others = std::max(1.0, distances[k + 1]);
+    const double others = std::max(usual, distances[k + 1]);
     if (distances[k] > kTimesTheOthers * others) limit = others;
   }
   return limit;
 }
-
-}  // namespace
 
 std::vector<std::size_t> false_readings(const Problem& problem) {
   const Drives drives(problem);
@@ -231,10 +230,11 @@ std::vector<std::size_t> false_readings(const Problem& problem) {
   const bool proven = drives.chained() && count[Reading::kContradicted] >= kFewestProven;
   const std::size_t off_the_way = count[Reading::kContradicted] + count[Reading::kUnconfirmed];
   const bool by_chance = count[Reading::kLate] * kOfWhichByChance <= off_the_way;
-  const double limit = farthest_of_others(distances);
+  const double limit = farthest_of_others(distances, 1);
+  const auto pushed_on = against_their_fingers(problem);
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const Reading of = readings[i];
-    if (distances[i] > limit || of == Reading::kContradicted ||
+    if (distances[i] > limit || contains(pushed_on, i) || of == Reading::kContradicted ||
         (proven && of == Reading::kUnconfirmed) || (proven && by_chance && of == Reading::kLate)) {
       rows.push_back(i);
     }

@@ -97,6 +97,14 @@ const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, dou
 // repeats, and where there are so many that there is no knowing which readings are false.
 std::vector<std::size_t> false_readings(const Problem& problem);
 
+// Pushes that end with their finger deep in the piece, or farther from where they began than the
+// finger went.  Drives have no finger.
+std::vector<std::size_t> against_their_fingers(const Problem& problem);
+
+// Beyond this some trials are like no other: one or one in 200, and four times as far as any other
+// and as is `usual`.  Infinity: none is.
+double farthest_of_others(std::vector<double> distances, double usual);
+
 // Samples of the fingers' ways between a jump there and one back (check_jumps()).
 struct TipJumps {
   std::vector<std::size_t> trials;           // that have some, ascending

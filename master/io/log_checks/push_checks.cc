@@ -30,6 +30,7 @@ constexpr double kTimesAsNear = 3;  // put right
 constexpr double kAsWell = 1.1;     // of what two readings leave
 // Of the reach, of half of the pushes: a unit 2.54 times the right one leaves some 0.5.
 constexpr double kMeets = 0.1;
+constexpr double kTimesUsual = 4;  // what nine in ten pushes stay below
 
 // Of the finger, m.
 double way_of(const Trial& t) {
@@ -299,6 +300,22 @@ TipJumps check_tip_jumps(const TrialLog& log) {
            " in all, from the fingers' ways; a diagnosis leaves these pushes out.",
        Severity::kNote});
   return jumps;
+}
+
+std::vector<std::size_t> against_their_fingers(const Problem& problem) {
+  if (problem.pieces.empty()) return {};
+  const double finger_m = problem.values[row_of(Push::kFingerRadius)];
+  const std::vector<Trial>& trials = problem.log.trials;
+  const auto off = mapped(trials, [&](const Trial& t) {
+    if (t.tip.empty()) return 0.0;
+    const Piece& piece = problem.piece(t.command);
+    const Eigen::Vector2d tip(t.tip.back().x, t.tip.back().y), middle = centroid(piece);
+    const double moved = (transform(t.X_WE, middle) - transform(t.X_WS, middle)).norm();
+    const double inside = finger_m - outside(tip, piece, t.X_WE);
+    return std::max({0.0, inside, moved - way_of(t)}) / reach_of(piece);
+  });
+  const double most = off.empty() ? 0 : std::max(kMeets, kTimesUsual * quantile(off, 0.9));
+  return filtered(indices(off.size()), [&](std::size_t i) { return off[i] > most; });
 }
 
 void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) {

@@ -162,12 +162,14 @@ ImpossibleTrials find_impossible(const Problem& problem) {
 
 void note_impossible(const Problem& problem, const ImpossibleTrials& found,
                      std::vector<SanityFinding>* findings) {
-  *findings = found.finger.findings;
+  append(*findings, found.finger.findings);
   note_rows(problem, found.fast, "impossible_rows",
             "end farther from their start than twice the log's own speed leads", findings);
   note_rows(problem, found.contradicted, "false_readings",
             "end where no other of their command does, and the reading before or after contradicts "
-            "theirs, others repeat it to the last digit, or nothing else is as far off",
+            "theirs, others repeat it to the last digit, no finger can have been there, or nothing "
+            "else is as "
+            "far off",
             findings);
 }
 
@@ -180,7 +182,8 @@ std::vector<SanityFinding> check_sanity(const Problem& problem,
   if (has_drives(problem)) check_drives(problem, &findings);
   if (problem.scenario == "push") check_pushes(problem, &findings);
   const ImpossibleTrials found = find_impossible(problem);
-  if (findings.empty()) note_impossible(problem, found, &findings);
+  const bool usable = !contains(findings, Severity::kUnusable, &SanityFinding::severity);
+  if (usable) note_impossible(problem, found, &findings);
   if (impossible != nullptr) *impossible = found.rows();
   for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
   check_clock(problem.log, &findings);

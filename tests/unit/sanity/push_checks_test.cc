@@ -46,7 +46,7 @@ Problem pushed_from(const std::function<double(int)>& aside_m) {
   Problem problem = pushed();
   for (Trial& t : problem.log.trials) {
     const double aside = aside_m(t.trial);
-    t.X_WE = t.X_WS * Pose{0.05, 0, std::abs(aside) > 0.01 ? -1.5 : 1.2};
+    t.X_WE = t.X_WS * (std::abs(aside) > 0.01 ? Pose{0.05, 0, -1.5} : Pose{0.07, 0, 1.2});
     for (TipSample& tip : t.tip) {
       tip.x -= aside * std::sin(t.X_WS.theta);
       tip.y += aside * std::cos(t.X_WS.theta);
@@ -226,6 +226,18 @@ TEST(PushChecks, NameTheUnitInWhichFingerAndPiecesMeet) {
   for (const double shift_m : {0.5, 4.0, 40.0}) {
     EXPECT_EQ(finding(1, 1, shift_m).name, "frames_apart") << shift_m;
   }
+}
+
+// A row that repeats its start although the finger went through there, and another piece's end.
+TEST(PushChecks, EndsThatTheirFingersExcludeAreFalse) {
+  Problem problem = pushed();
+  EXPECT_TRUE(against_their_fingers(problem).empty());
+  problem.log.trials[4].X_WE = problem.log.trials[4].X_WS;
+  problem.log.trials[9].X_WE.x += 0.25;
+  EXPECT_EQ(against_their_fingers(problem), (std::vector<std::size_t>{4, 9}));
+  std::vector<std::size_t> omitted;
+  check_sanity(problem, &omitted);
+  EXPECT_EQ(omitted, (std::vector<std::size_t>{4, 9}));
 }
 
 TEST(PushChecks, NoteAnotherPiece) {
