@@ -173,7 +173,18 @@ TEST(PlanarCases, ATiltIsAllThatIsMissingOfARobotWithAnotherFriction) {
                                    "--outside", "0", "--effects", "floor_tilt", "--sessions", "2",
                                    "--trials", "40", "--seed", "2"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
-  the_only_tilt(folder / "out/cases/case001/trials.csv");
+  const std::string log = folder / "out/cases/case001/trials.csv";
+  the_only_tilt(log);
+  // Nor does a reading 10 cm off, which nothing contradicts since a hand moved the robot next.
+  std::string text = *read_text_file(log);
+  const std::size_t end = text.find("\ns1,4,"), row = text.find("\ns1,3,");
+  std::size_t x1 = row;
+  for (int comma = 0; comma < 10; ++comma) x1 = text.find(',', x1 + 1);
+  const std::size_t after = text.find(',', ++x1);
+  ASSERT_LT(after, end);
+  const double read_m = std::stod(text.substr(x1, after - x1));
+  text.replace(x1, after - x1, std::to_string(read_m + 0.1));
+  the_only_tilt(folder.write("false.csv", text));
 }
 
 // Alone its base is tuned to a third of the robot's length, and to half of it beside the tilt.

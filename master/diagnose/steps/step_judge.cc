@@ -70,6 +70,12 @@ Verdict with_oddities(Verdict verdict, const Explanation& found) {
   return verdict;
 }
 
+std::string lone_text(const DiagnosisRequest& of, std::size_t lone) {
+  const Trial& trial = of.problem.log.trials[lone];
+  return "Trial " + std::to_string(trial.trial) + " of session " + trial.session +
+         " ends like no other, and nothing foresees it: it is omitted. Look at its row.";
+}
+
 bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value) {
   if (row.kind != ParameterKind::kReal || place_of(effects, row) != nullptr) return false;
   if (row.key.ends_with(".direction")) return false;
@@ -183,6 +189,7 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
   for (const std::string& odd : {named.odd_readings, named.odd_drives}) {
     if (!odd.empty()) judged.cautions.push_back(odd);
   }
+  for (const std::size_t lone : named.lone) judged.cautions.push_back(lone_text(of, lone));
   for (const NearMiss& refused : screening.refused) judged.cautions.push_back(refused.text);
   if (judged.verdict == Verdict::kUnknown || judged.verdict == Verdict::kEffectAndUnknown) {
     judged.nearest = nearest(screening, by_means, judged.left);

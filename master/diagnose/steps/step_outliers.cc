@@ -11,6 +11,7 @@
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/infer/settings.h"
+#include "master/io/log_checks/log_checks.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -74,6 +75,27 @@ Explanation look_for_spreads(const DiagnosisRequest& of, Explanation partial,
   }
   partial.spreads.push_back(std::move(*best));
   return without(partial, study.ignored);
+}
+
+Result<Explanation> leave_lone_out(const DiagnosisRequest& of, Explanation partial,
+                                   const Regression& explained) {
+  const Eigen::VectorXd z = studentised(explained, 0.2);
+  std::vector<double> far;
+  for (Eigen::Index i = 0; i < z.size(); i += 3) far.push_back(z.segment<3>(i).norm());
+  const double limit = farthest_of_others(far, std::sqrt(kFarSquared));
+  std::vector<bool> ignored = partial.study().ignored;
+  ignored.resize(far.size(), false);
+  const std::size_t before = partial.lone.size();
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    if (!(far[i] > limit)) continue;
+    ignored[i] = true;
+    partial.lone.push_back(i);
+  }
+  if (partial.lone.size() == before) return partial;
+  Explanation rest = without(partial, ignored);
+  ASSIGN_OR_RETURN(auto measured, measure(of, rest.study()));
+  rest.evidence = std::make_shared<const Evidence>(std::move(measured));
+  return rest;
 }
 
 Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation partial,

@@ -59,6 +59,9 @@ Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial
 Explanation look_for_spreads(const DiagnosisRequest& of, Explanation partial,
                              const Regression& explained,
                              std::optional<double> by_means = std::nullopt);
+// Without a trial that is like no other beside what is explained, which no effect foresees.
+Result<Explanation> leave_lone_out(const DiagnosisRequest& of, Explanation partial,
+                                   const Regression& explained);
 // Whether each session has a gain of its own, of a spread that is clear from what is left of every
 // trial (m, m, rad); no statement about means uses them then.
 Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation partial,

@@ -57,11 +57,14 @@ std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evide
 Result<Screening> look_for_spreads_beside(const DiagnosisRequest& of, Screening screening) {
   for (;;) {
     Explanation& found = screening.found;
-    const std::size_t before = found.spreads.size();
+    const std::size_t before = found.spreads.size(), lone = found.lone.size();
     const Regression explained = explained_by(*screening.catalogue, found);
-    found = look_for_spreads(of, found, explained,
-                             std::max(0.0, explained_nats(*screening.catalogue, explained)));
-    if (found.spreads.size() == before) return screening;
+    ASSIGN_OR_RETURN(found, leave_lone_out(of, found, explained));
+    if (found.lone.size() == lone) {
+      found = look_for_spreads(of, found, explained,
+                               std::max(0.0, explained_nats(*screening.catalogue, explained)));
+    }
+    if (found.spreads.size() == before && found.lone.size() == lone) return screening;
     ASSIGN_OR_RETURN(screening, compete(of, std::move(found)));
   }
 }
@@ -160,7 +163,8 @@ Result<Screening> compete_from_both(const DiagnosisRequest& of, Explanation besi
 }
 
 Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explanation& found) {
-  Explanation beside = look_for_spreads(of, found, found.evidence->base);
+  ASSIGN_OR_RETURN(Explanation beside, leave_lone_out(of, found, found.evidence->base));
+  beside = look_for_spreads(of, beside, beside.evidence->base);
   auto screening = found.frees_base ? compete_from_free_base(of, std::move(beside))
                                     : compete_from_both(of, std::move(beside));
   if (screening && found.frees_base && base_is_on_bounds(screening->found)) return screening;

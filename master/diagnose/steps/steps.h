@@ -70,8 +70,9 @@ struct Explanation {
   std::vector<EffectCandidate> chosen;
   std::optional<JointFit> estimates;  // of these, base held, beside nuisances
 
-  std::string odd_readings;  // what readings show that no effect looked for explains
-  std::string odd_drives;    // the same of outlier drives in one place
+  std::vector<std::size_t> lone;  // trials that are like no other: omitted
+  std::string odd_readings;       // what readings show that no effect looked for explains
+  std::string odd_drives;         // the same of outlier drives in one place
 
   const Study& study() const { return evidence->study; }
   bool chose(const std::string& effect) const {
