@@ -330,8 +330,15 @@ std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<Groun
   for (GroundHypothesis& h : all) {
     // In a mirrored world every turn and every step aside is the other way, as if the robot's own
     // had been taken for one another, and so they are for a sensor that hangs upside down.  The
-    // inverse of an increment is the way back, as a sensor that looks back sees the sides swapped.
-    if (h.name != "sides_swapped" && h.name != "steering_reversed") continue;
+    // inverse of an increment is the way back: of reversed commands, or, as a sensor that looks
+    // back sees it, of swapped sides.
+    const bool sides = h.name == "sides_swapped" || h.name == "steering_reversed";
+    if (log.relative && (sides || h.name == "command_reversed")) {
+      h.aliases.emplace_back("increments_inverted");
+      h.remedy +=
+          " If each increment is the earlier pose in the later one's frame, invert them instead.";
+    }
+    if (!sides) continue;
     const std::string other =
         log.relative ? "a sensor that is mounted upside down" : "y and headings both mirrored";
     h.thing += " (or " + other + (log.relative ? ", or increments that are inverted)" : ")");
@@ -339,10 +346,6 @@ std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<Groun
         " If it is " + other +
         ", turn the signs of y and theta instead, and diagnose again: other values hold then.";
     h.aliases.emplace_back(log.relative ? "sensor_upside_down" : "axes_mirrored");
-    if (!log.relative) continue;
-    h.aliases.emplace_back("increments_inverted");
-    h.remedy +=
-        " If each increment is the earlier pose in the later one's frame, invert them instead.";
   }
   GroundHypothesis gyro{kGyroScale, {}, "the scale of the gyro", {}};
   add_gyro_scale(log, &gyro.freed);
