@@ -130,8 +130,9 @@ Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow
     if (!best || fit.objective > best->objective) best = std::move(fit);
   }
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    double& value = best->values[k];
-    value = rows[k].row.name == "marker_yaw" ? wrap_angle(value) : rows[k].row.nominal;
+    // Of all turns the one that is least off.
+    const double begun = rows[k].row.nominal, off = wrap_angle(best->values[k] - begun);
+    best->values[k] = begun + (rows[k].row.name == "marker_yaw" ? off : 0);
   }
   return best->values;
 }
