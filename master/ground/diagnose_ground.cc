@@ -34,12 +34,12 @@ void set_sensor(const SensorValue& v, GroundRobot* robot) {
 
 // The robot with the pose that increments give their sensor, and what is asked of it then: all but
 // that pose.
-Result<GroundRobot> sense(const GroundRobot& robot, const GroundDiagnoseOptions& options,
-                          RunLog* log, GroundQuestion* question) {
+Result<GroundRobot> sense(const GroundRobot& robot, GroundWork* work, RunLog* log,
+                          GroundQuestion* question) {
   std::erase_if(question->catalogue, [](const GroundHypothesis& h) {
     return !h.freed.empty() && h.freed[0].name.starts_with("marker_");
   });
-  RETURN_IF_ERROR(settle_sensor(robot, options.windows, options.seed, log, question));
+  RETURN_IF_ERROR(settle_sensor(robot, &work->windows, work->seed, log, question));
   GroundRobot sensed = robot;
   for (const SensorValue& v : question->sensor) {
     set_sensor(v, &sensed);
@@ -86,6 +86,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
                                         const std::optional<WheelLoop>& loop,
                                         GroundQuestion question) {
   StageClock clock(options.on_stage);
+  GroundWork work = options;
   if (options.reference) {
     clock.begin(kGroundStages[0].name);
     ASSIGN_OR_RETURN(auto asked, ask_what_changed(robot, *options.reference, options.windows,
@@ -96,10 +97,9 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
   const std::string as_it_was = format_robot(file);
   if (log.relative && !options.reference) {
     clock.begin(kFaultStage);
-    ASSIGN_OR_RETURN(auto sensed, sense(robot, options, &log, &question));
+    ASSIGN_OR_RETURN(auto sensed, sense(robot, &work, &log, &question));
     robot = std::move(sensed);
   }
-  GroundWork work = options;
   work.on_stage = [&](const std::string& stage) { clock.begin(stage); };
   ASSIGN_OR_RETURN(auto search, search_ground(robot, log, question, work));
   search.loop = loop;
@@ -120,7 +120,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
 
 std::vector<SanityFinding> wrong_way_round(const GroundRobot& robot, const RunLog& log) {
   GroundQuestion question = ask_what_is_wrong(robot, log);
-  const WindowSettings windows = {{2}, 0.5};
+  WindowSettings windows = {{2}, 0.5};
   const auto found = [&](std::size_t hypothesis, const std::string& evidence) {
     const GroundHypothesis& h = question.catalogue[hypothesis];
     return std::vector<SanityFinding>{{h.name, "With " + h.thing + " put right, " + evidence,
@@ -128,7 +128,7 @@ std::vector<SanityFinding> wrong_way_round(const GroundRobot& robot, const RunLo
   };
   if (log.relative) {
     RunLog settled = log;
-    if (!settle_sensor(robot, windows, 1, &settled, &question) || question.faults.empty())
+    if (!settle_sensor(robot, &windows, 1, &settled, &question) || question.faults.empty())
       return {};
     return found(question.faults.front().hypothesis,
                  "increments follow the robot's wheels, else they do not.");

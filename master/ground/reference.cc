@@ -32,6 +32,7 @@ constexpr int kTurns = 8;
 constexpr int kScanRounds = 3;
 constexpr int kRounds = 40, kFaultRounds = 8;
 constexpr double kShift_s = 0.05, kMostShift_s = 1;  // between clocks that rows make one
+constexpr double kLeastShift_s = 1e-3;
 // A grip that was never reached has no upper end that shows, and none below that does not: half of
 // how far it may fall, in its logarithm, before another one is distinguished.
 constexpr double kMostUnsureGrip = 2, kGripStep = 0.1;
@@ -345,14 +346,31 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   return question;
 }
 
-Status settle_sensor(const GroundRobot& robot, const WindowSettings& settings, std::uint64_t seed,
+WindowSettings windows_of_rows(const RunLog& log, const WindowSettings& usual) {
+  const bool together = log.relative && shares_a_clock(log);
+  return together ? WindowSettings{{kEachRow_s}, usual.run_in_s} : usual;
+}
+
+bool reads_apart(const GroundRobot& robot, double delay_s) {
+  return std::abs(delay_s - robot.motors.delay_s) > kLeastShift_s;
+}
+
+Status settle_sensor(const GroundRobot& robot, WindowSettings* settings, std::uint64_t seed,
                      RunLog* log, GroundQuestion* question) {
+  const WindowSettings usual = *settings;
+  *settings = windows_of_rows(*log, usual);
   for (;;) {
-    ASSIGN_OR_RETURN(const auto windows, window_set(robot, *log, settings));
+    ASSIGN_OR_RETURN(const auto windows, window_set(robot, *log, *settings));
     const WindowFitter fitter(robot, windows);
     const WindowFit fit = open_fit(fitter, robot, question->rows, *log);
+    const Eigen::Index delay = row_index(fit.rows, "delay");
+    if (settings->horizons_s != usual.horizons_s && delay >= 0 &&
+        reads_apart(robot, fit.values[delay])) {
+      *settings = usual;
+      continue;
+    }
     auto fault = question->faults.size() < kMostFaults && !explains(fitter, fit)
-                     ? fault_of_increments(robot, *log, settings, *question, fit)
+                     ? fault_of_increments(robot, *log, *settings, *question, fit)
                      : std::nullopt;
     if (fault) {
       question->faults.push_back(*fault);

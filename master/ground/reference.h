@@ -21,9 +21,16 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
 
 // Of increments it is open which way their sensor looks and where it stands: both are fitted with
 // every value, whatever the robot's file has, before anything else is asked.
-// Faults are put right in the log, and both stand in the question then.  Errors: no window fits.
-Status settle_sensor(const GroundRobot& robot, const WindowSettings& settings, std::uint64_t seed,
+// Faults are put right in the log, and both stand in the question then; `windows` become those of
+// each row where wheels were read with them.  Errors: no window fits.
+Status settle_sensor(const GroundRobot& robot, WindowSettings* windows, std::uint64_t seed,
                      RunLog* log, GroundQuestion* question);
+
+// Increments err each by itself: a window of several knows nothing that they do not, as long as
+// wheels were read with them; else those given.
+WindowSettings windows_of_rows(const RunLog& log, const WindowSettings& usual);
+// Whether wheels were read at other times than increments, by a fit's delay.
+bool reads_apart(const GroundRobot& robot, double delay_s);
 
 // The values of change_rows() and of command_offsets() by one log alone, without poses that the
 // tracker took from elsewhere; their covariance is by its own scatter.  Errors: as

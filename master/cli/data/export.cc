@@ -22,8 +22,6 @@ namespace gapfarm {
 namespace {
 
 constexpr int kMostSamplesOut = 9999;
-constexpr double kLeastShift_s = 1e-3;
-constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two poses is longer than
 
 // Friction as the run has it, where the run searched for it.
 RosFriction simulated_friction(const Problem& problem, const Model& model) {
@@ -65,17 +63,14 @@ Result<GroundReference> fit_source(const GroundSource& source, Console& console)
   }
   const RunLog log = without(logged, checks);
   console.note("fitting the robot's kinematics to the log");
-  // Increments err each by itself: a window of several knows nothing that they do not, unless
-  // wheels were read at other times.
-  const bool together = log.relative && shares_a_clock(log);
-  const WindowSettings each_row = {{kEachRow_s}, 0.5}, summed = {{0.5, 2, 5}, 0.5};
-  const auto ask = [&](const WindowSettings& windows) {
-    return ask_what_changed(robot, log, windows, 1, nullptr, /*alone=*/true);
+  const WindowSettings usual = GroundWork().windows, windows = windows_of_rows(log, usual);
+  const auto ask = [&](const WindowSettings& of) {
+    return ask_what_changed(robot, log, of, 1, nullptr, /*alone=*/true);
   };
-  ASSIGN_OR_RETURN(auto asked, ask(together ? each_row : summed));
-  const double delay_s = robot.motors.delay_s;
-  if (together && std::abs(asked.reference->value_or("delay", delay_s) - delay_s) > kLeastShift_s) {
-    ASSIGN_OR_RETURN(asked, ask(summed));
+  ASSIGN_OR_RETURN(auto asked, ask(windows));
+  const double delay_s = asked.reference->value_or("delay", robot.motors.delay_s);
+  if (windows.horizons_s != usual.horizons_s && reads_apart(robot, delay_s)) {
+    ASSIGN_OR_RETURN(asked, ask(usual));
   }
   return *std::move(asked.reference);
 }

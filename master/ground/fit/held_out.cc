@@ -149,9 +149,9 @@ HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const
                           std::uint64_t seed) {
   const std::vector<double> gains = block_gains(windows, with, without);
   std::vector<double> counts(gains.size(), 0.0);
-  for (const int block : windows.block) counts[block] += 1;
+  for (const int block : windows.block) counts[block] += windows.counts;
   return drawn_gain(windows, seed, [&](const std::vector<double>& times) {
-    return weighted(gains, times) / std::max(1.0, weighted(counts, times));
+    return weighted(gains, times) / std::max(windows.counts, weighted(counts, times));
   });
 }
 

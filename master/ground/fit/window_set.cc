@@ -15,6 +15,8 @@
 namespace gapfarm {
 namespace {
 
+constexpr double kUsualWindow_s = 2.5;  // the mean of GroundWork's
+
 bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
   if (a.size() - from_a != b.size()) return false;
   for (std::size_t i = 0; i < b.size(); ++i) {
@@ -147,7 +149,8 @@ void add_blocks(const RunLog& log, WindowSet* set) {
 }  // namespace
 
 std::string WindowSet::length_text(int of_horizon) const {
-  return fmt::format("{:g} s", lengths_s[static_cast<std::size_t>(of_horizon % lengths)]);
+  const double length_s = lengths_s[static_cast<std::size_t>(of_horizon % lengths)];
+  return length_s == kEachRow_s ? "a row" : fmt::format("{:g} s", length_s);
 }
 
 double WindowSet::stretches() const {
@@ -189,6 +192,10 @@ Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
   ASSIGN_OR_RETURN(auto set, pose_windows(log, settings, is_throttled(robot), true));
   for (const Trial& trial : set.trials) set.origin_m += Eigen::Vector2d(trial.X_WS.x, trial.X_WS.y);
   set.origin_m /= static_cast<double>(set.trials.size());
+  if (set.lengths_s.back() == kEachRow_s) {
+    const double row_s = mean(mapped(set.trials, [](const Trial& t) { return *t.duration_s; }));
+    set.counts = std::min(1.0, row_s / kUsualWindow_s);
+  }
   add_noise(log, &set);
   add_gyro(log, &set);
   add_returns(robot, log, &set);

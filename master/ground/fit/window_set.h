@@ -18,6 +18,9 @@ namespace gapfarm {
 // What a window's end is held against.
 enum class Sense : char { kPose, kGyro, kReturn };
 
+// A horizon that every way between two poses is longer than, s.
+inline constexpr double kEachRow_s = 1e-3;
+
 // The gyro's ratio to what it should measure, among the rows of a fit.
 inline constexpr const char* kGyroScale = "gyro_scale";
 
@@ -47,6 +50,9 @@ struct WindowSet {
   std::vector<Eigen::Matrix3d> noise;
   // What every window errs by beside that (slip, timing), of the middle window's stated variance.
   double least_noise = 0.1;
+  // Of a window, what gaps are counted by: of single rows the share of a usual window that they
+  // last.
+  double counts = 1;
   std::vector<double> turned_rad;  // of each trial by the gyro, its bias in; empty: there is none
   std::vector<Return> returns;
   Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();  // the middle of where trials begin

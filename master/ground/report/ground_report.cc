@@ -90,8 +90,8 @@ class GroundReport {
     }
     const double floor = mean(search_.best.nats);
     const WindowFit &before = step.before, &after = search_.chain[place + 1];
-    effect.gap_before = floor - mean(before.nats);
-    effect.gap_after = floor - mean(after.nats);
+    effect.gap_before = (floor - mean(before.nats)) / search_.windows.counts;
+    effect.gap_after = (floor - mean(after.nats)) / search_.windows.counts;
     effect.position_mm_before = rms_mm(before);
     effect.position_mm_after = rms_mm(after);
     effect.heading_mrad_before = rms_mrad(before);
@@ -122,7 +122,7 @@ class GroundReport {
               "what was measured.",
               h.thing, source_of(robot_), std::exp(gap / 3)),
           h.remedy);
-      effect.gap_before = gap;
+      effect.gap_before = gap / search_.windows.counts;
       effect.text += " " + h.remedy;
       d_.effects.push_back(std::move(effect));
     }
@@ -181,7 +181,8 @@ class GroundReport {
   void figures() {
     const double floor = mean(search_.best.nats);
     const WindowFit &file = search_.chain.front(), &named = search_.chain.back();
-    d_.gap = {floor - mean(file.nats), floor - mean(named.nats), 0};
+    const double counts = search_.windows.counts;
+    d_.gap = {(floor - mean(file.nats)) / counts, (floor - mean(named.nats)) / counts, 0};
     share_with_faults();
     d_.position_mm = {rms_mm(file), rms_mm(named), rms_mm(search_.best)};
     d_.heading_mrad = {rms_mrad(file), rms_mrad(named), rms_mrad(search_.best)};

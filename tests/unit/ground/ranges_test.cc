@@ -81,7 +81,7 @@ TEST(Ranges, WhatAMatcherErrsByIsNotTheRobots) {
   const GroundRobot robot = scan_matched::robot_by_its_maker();
   const auto asked =
       ask_what_changed(robot, scan_matched::driven(2, 41, scan_matched::kSensor, true, rows),
-                       {{scan_matched::kEachRow_s}, 0}, 1, nullptr, /*alone=*/true);
+                       {{kEachRow_s}, 0}, 1, nullptr, /*alone=*/true);
   ASSERT_TRUE(asked) << asked.error().message;
   const Ranges ranges = ranges_of(robot, *asked->reference);
   EXPECT_LT(range_of(ranges, "left_wheel_radius").varies, 1e-4);

@@ -17,6 +17,15 @@ namespace gapfarm::relative_poses_test {
 
 using namespace scan_matched;
 
+GroundRobot robot_as_it_is() {
+  GroundRobot robot = robot_by_its_maker();
+  for (RobotWheel& wheel : robot.wheels) {
+    if (wheel.driven) wheel.radius_m = wheel.side == WheelSide::kLeft ? kLeft_m : kRight_m;
+  }
+  robot.controller.wheel_separation_m = kSeparation_m;
+  return robot;
+}
+
 // Wheel speeds change where poses were taken: each counts on its own side of them.
 TEST(RelativePoses, CalibrateWheelsAndASensorThatLooksAnyWay) {
   for (const double yaw : {0.05, 1.6, -1.5, 3.1}) {
@@ -107,6 +116,53 @@ TEST(RelativePoses, DiagnoseARobotWhoseSensorLooksAnyWay) {
       EXPECT_NEAR(*wheel.radius_m, r, 3e-3 * r) << yaw;
     }
   }
+}
+
+// A file that says pi of a heading that is read a little beyond it was a whole turn off.
+TEST(RelativePoses, ASensorThatLooksBackIsNotAWholeTurnOff) {
+  GroundRobot robot = robot_as_it_is();
+  robot.X_RM = {0.1, 0.02, std::acos(-1.0)};
+  const auto found = diagnose_ground(robot, driven(6, 32, {0.1, 0.02, -3.14}), {});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->diagnosis.verdict, Verdict::kNone) << found->diagnosis.headline;
+}
+
+// Windows of several rows left a few of them, none without a false match in it: `none`.
+TEST(RelativePoses, ThirtyRowsShowAWrongSeparation) {
+  GroundRobot robot = robot_as_it_is();
+  robot.X_RM = kSensor;
+  robot.controller.wheel_separation_m = 1.1 * kSeparation_m;
+  for (std::uint64_t seed = 50; seed < 54; ++seed) {
+    RunLog log = driven(1, seed);
+    log.runs[0].poses.resize(31);
+    std::erase_if(log.runs[0].commands, [](const CommandRow& c) { return c.t_s >= 30 * kDt_s; });
+    for (std::size_t k = 3; k < 31; k += 9) {
+      for (std::size_t later = k; later < 31; ++later) log.runs[0].poses[later].X_WM.x += 0.1;
+    }
+    const auto found = diagnose_ground(robot, log, {});
+    ASSERT_TRUE(found) << found.error().message;
+    const std::vector<std::string> named = mapped(found->diagnosis.effects, &NamedEffect::name);
+    EXPECT_TRUE(contains(named, "wheel_separation")) << seed << ": " << found->diagnosis.headline;
+    EXPECT_NEAR(*found->corrected.controller.wheel_separation_m, kSeparation_m,
+                0.02 * kSeparation_m);
+  }
+}
+
+// The way back along an arc is that of reversed commands, whatever the sensor's pose.
+TEST(RelativePoses, ReportThatIncrementsMayBeInverted) {
+  RunLog log = driven(2, 31);
+  for (LoggedRun& run : log.runs) {
+    Pose before, after;
+    for (PoseRow& row : run.poses) {
+      const Pose step = inverse(between(before, row.X_WM));
+      before = row.X_WM;
+      row.X_WM = after = after * step;
+    }
+  }
+  const auto found = check_ground_log(robot_by_its_maker(), log);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].name, "command_reversed");
+  EXPECT_TRUE(contains(found[0].or_else, "increments_inverted"));
 }
 
 // It was named another scale of all positions, which increments cannot distinguish from it.

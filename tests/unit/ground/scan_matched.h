@@ -19,7 +19,6 @@ namespace gapfarm::scan_matched {
 // Half a metre a second at most, a sensor 0.1 m ahead that looks a little to the left.
 inline constexpr double kLeft_m = 0.0515, kRight_m = 0.0492, kSeparation_m = 0.312;
 inline const Pose kSensor{0.1, 0.02, 0.05};
-inline constexpr double kEachRow_s = 1e-3;
 inline constexpr double kGyroScaleTrue = 1.008;
 
 inline GroundRobot robot_by_its_maker() {
