@@ -26,10 +26,13 @@ GroundQuestion ask_what_is_wrong(const GroundRobot& robot, const RunLog& log) {
 }
 
 void set_sensor(const SensorValue& v, GroundRobot* robot) {
-  const bool x = v.row.name == "marker_x", y = v.row.name == "marker_y";
-  (x   ? robot->X_RM.x
-   : y ? robot->X_RM.y
-       : robot->X_RM.theta) = x || y ? v.value : wrap_angle(v.value);
+  if (v.row.name == "marker_x") {
+    robot->X_RM.x = v.value;
+  } else if (v.row.name == "marker_y") {
+    robot->X_RM.y = v.value;
+  } else {
+    robot->X_RM.theta = wrap_angle(v.value);
+  }
 }
 
 // The robot with the pose that increments give their sensor, and what is asked of it then: all but
