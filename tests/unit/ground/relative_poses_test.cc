@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <set>
+#include <utility>
 
 #include "common/base/ranges.h"
 #include "common/recordings/run.h"
@@ -24,6 +26,17 @@ GroundRobot robot_as_it_is() {
   }
   robot.controller.wheel_separation_m = kSeparation_m;
   return robot;
+}
+
+// As another matcher would have it of each pose and the one before.
+void remake_increments(RunLog* log, const std::function<Pose(const Pose& last, const Pose&)>& of) {
+  for (LoggedRun& run : log->runs) {
+    Pose last, after;
+    for (PoseRow& row : run.poses) {
+      after = after * of(last, row.X_WM);
+      last = std::exchange(row.X_WM, after);
+    }
+  }
 }
 
 // Wheel speeds change where poses were taken: each counts on its own side of them.
@@ -151,14 +164,8 @@ TEST(RelativePoses, ThirtyRowsShowAWrongSeparation) {
 // The way back along an arc is that of reversed commands, whatever the sensor's pose.
 TEST(RelativePoses, ReportThatIncrementsMayBeInverted) {
   RunLog log = driven(2, 31);
-  for (LoggedRun& run : log.runs) {
-    Pose before, after;
-    for (PoseRow& row : run.poses) {
-      const Pose step = inverse(between(before, row.X_WM));
-      before = row.X_WM;
-      row.X_WM = after = after * step;
-    }
-  }
+  remake_increments(&log,
+                    [](const Pose& last, const Pose& X) { return inverse(between(last, X)); });
   const auto found = check_ground_log(robot_by_its_maker(), log);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].name, "command_reversed");
@@ -294,14 +301,8 @@ TEST(RelativePoses, NameNothingWhereCommandsExplainNothing) {
 // Upside down it sees what a robot would do whose sides are swapped.
 TEST(RelativePoses, ReportThatTheSensorMayBeUpsideDown) {
   RunLog log = driven(2, 31, {0.1, 0.02, 1.6});
-  for (LoggedRun& run : log.runs) {
-    Pose before, after;
-    for (PoseRow& row : run.poses) {
-      const Pose step = mirrored(between(before, row.X_WM));
-      before = row.X_WM;
-      row.X_WM = after = after * step;
-    }
-  }
+  remake_increments(&log,
+                    [](const Pose& last, const Pose& X) { return mirrored(between(last, X)); });
   const auto asked = ask_what_changed(robot_by_its_maker(), log, {{kEachRow_s}, 0}, 1, nullptr);
   ASSERT_FALSE(asked);
   EXPECT_NE(asked.error().message.find("upside down"), std::string::npos) << asked.error().message;
@@ -351,14 +352,9 @@ TEST(RelativePoses, AxesOfTheWorldAreFound) {
   for (int k = 0; k < 120; ++k)
     rows.push_back({2 + 3 * stream.uniform(), 4 + 4 * stream.uniform()});
   RunLog log = log_of({scanned("1", rows, kSensor, {}, stream)});
-  for (LoggedRun& run : log.runs) {
-    Pose before, after;
-    for (PoseRow& row : run.poses) {
-      const Pose step{row.X_WM.x - before.x, row.X_WM.y - before.y, row.X_WM.theta - before.theta};
-      before = row.X_WM;
-      row.X_WM = after = after * step;
-    }
-  }
+  remake_increments(&log, [](const Pose& last, const Pose& X) {
+    return Pose{X.x - last.x, X.y - last.y, X.theta - last.theta};
+  });
   const auto found = check_ground_log(robot_by_its_maker(), log);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].name, "increments_in_world");
