@@ -18,7 +18,7 @@ fi
 
 T=$(mktemp -d /tmp/gapfarm-sge-XXXXXX)
 chmod 755 "$T"
-interval=4  # of the scheduler, s
+interval=6  # of the scheduler, s
 # Asked to end, a qmaster takes seven seconds.
 sge=()
 trap 'kill -KILL "${sge[@]}"; wait "${sge[@]}"; clean_up' EXIT
@@ -72,7 +72,7 @@ write_config
 start_master 127.0.0.1
 while sleep 0.2; do qstat -u root -g d 2>/dev/null | grep -c '^ *[0-9]'; done >"$T/standing" &
 started+=($!)
-"$BIN/gapfarm" workers --on sge --run "$T/run" --keys "$T/keys" --max 8 --wall-time 8 --look-every 1 --block 1 \
+"$BIN/gapfarm" workers --on sge --run "$T/run" --keys "$T/keys" --max 8 --wall-time 20 --look-every 1 --block 1 \
   --worker-logs "$T/logs" 2>"$T/workers.log" &
 fleet=$!
 started+=("$fleet")
