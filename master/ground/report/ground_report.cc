@@ -163,7 +163,9 @@ class GroundReport {
     const PoseGrid& g = search_.grid;
     const double rounding_m = g.step_m / std::sqrt(6.0);  // of the difference of two positions
     const double least_m = search_.free_fit.scales.front().head<2>().minCoeff();
-    if (g.step_m > 0 && rounding_m >= kLeastRounding * least_m) {
+    const double reach_m = wheel_reach_m(robot_);
+    const bool coarse = reach_m > 0 && g.step_m >= kCoarseRounding * reach_m;
+    if (g.step_m > 0 && (coarse || rounding_m >= kLeastRounding * least_m)) {
       add("pose_quantisation", {}, {"step", g.step_m, g.lo_m, g.hi_m, "m"},
           fmt::format("Positions are rounded to a grid of {:.4g} mm ({:.0f} nats).", 1e3 * g.step_m,
                       g.nats),

@@ -139,16 +139,17 @@ TEST(WrongFile, NoVerdictContradictsItsFiguresOnAnyLog) {
 TEST(WrongFile, ReadingsAreNamedAndNoAbsurdScale) {
   const auto real = practice_case("case11");  // a skid-steer
   if (!real) GTEST_SKIP() << "no shared data";
-  const double step = 0.25;
-  const GroundDiagnosis rounded = checked(
-      real->robot,
-      posed(real->log,
-            [&](const Pose& X) {
-              return Pose{step * std::round(X.x / step), step * std::round(X.y / step), X.theta};
-            }),
-      "rounded");
-  EXPECT_TRUE(names(rounded, "pose_quantisation")) << rounded.diagnosis.headline;
-  EXPECT_FALSE(names(rounded, "camera_aspect")) << rounded.diagnosis.headline;
+  for (const double step : {0.1, 0.25}) {
+    const GroundDiagnosis rounded = checked(
+        real->robot,
+        posed(real->log,
+              [&](const Pose& X) {
+                return Pose{step * std::round(X.x / step), step * std::round(X.y / step), X.theta};
+              }),
+        "rounded");
+    EXPECT_TRUE(names(rounded, "pose_quantisation")) << step << ": " << rounded.diagnosis.headline;
+    EXPECT_FALSE(names(rounded, "camera_aspect")) << step << ": " << rounded.diagnosis.headline;
+  }
   Stream stream({11, Purpose::kTest, 0, 0, 0});
   RunLog stale = real->log;
   for (LoggedRun& run : stale.runs) {
