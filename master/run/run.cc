@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
+#include <tuple>
 
 #include "common/base/ranges.h"
 #include "common/trials/read.h"
@@ -40,14 +42,15 @@ Status find_start(const RunRequest& run, Farm& farm, RunWatcher& watcher, Optimi
 // Of trials that the model was fitted to.  A baseline has a handful of numbers a command: fitted to
 // the trials that it is scored on it would look better than it is.
 constexpr const char* kFromOthers =
-    "learned from the other sessions or parts of the log (the model has seen all of it)";
+    "learned from the other sessions or parts of the log (the model has seen trials of it)";
 
-bool same_trials(const TrialLog& a, const TrialLog& b) {
-  const auto same = [](const Trial& s, const Trial& t) {
-    return s.session == t.session && s.trial == t.trial && s.command == t.command &&
-           s.X_WS.x == t.X_WS.x && s.X_WE.x == t.X_WE.x && s.X_WE.y == t.X_WE.y;
+bool share_trials(const TrialLog& a, const TrialLog& b) {
+  const auto key = [](const Trial& t) {
+    return std::tuple(t.command, t.X_WS.x, t.X_WE.x, t.X_WE.y);
   };
-  return std::equal(a.trials.begin(), a.trials.end(), b.trials.begin(), b.trials.end(), same);
+  const auto keys = mapped(a.trials, key);
+  const std::set of_a(keys.begin(), keys.end());
+  return std::ranges::any_of(b.trials, [&](const Trial& t) { return of_a.contains(key(t)); });
 }
 
 std::string note(const std::vector<BaselineComparison>& baselines, const std::string& how) {
@@ -175,7 +178,8 @@ Result<std::string> baseline_note(const Model& model, const TrialLog& log,
                                   std::span<const double> scores) {
   if (!has_baselines(model.scenario) || log.trials.empty()) return std::string();
   const auto behind = trials_behind(model);
-  if (behind && !same_trials(*behind, log)) {
+  // What has seen some of these trials predicts them the better for it.
+  if (behind && !share_trials(*behind, log)) {
     ASSIGN_OR_RETURN(const auto baselines, baseline_scores(*behind, log, model.commands));
     return note(compare_with_baselines(baselines, scores), "learned from the model's trials");
   }

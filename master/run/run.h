@@ -91,7 +91,7 @@ Error stopped_by(RunStore& store, Error error, const Progress& last = {});
 
 // Beside the model's log scores, one a trial of `log`; empty where no command repeats enough or
 // baselines make no sense.  Learned from the trials behind the model; where those are not at hand,
-// or are the same, from the other sessions of `log`.  The sentence says which.
+// or share some with it, from the other sessions of `log`.  The sentence says which.
 Result<std::string> baseline_note(const Model& model, const TrialLog& log,
                                   std::span<const double> scores);
 

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "common/config/model.h"
+#include "common/trials/read.h"
 #include "master/run/stored_run.h"
 #include "tests/integration/demo_config.h"
 #include "tests/unit/blind/worker_farm.h"
@@ -297,6 +298,29 @@ TEST(Overrides, OutrankWhatWasStoredAndComeBackFromJson) {
   EXPECT_EQ(settings.optimiser.population, 12u);
   EXPECT_EQ(settings.evaluations, std::nullopt);
   EXPECT_EQ(EvolutionOverrides::from_json("[1]").generations, std::nullopt);
+}
+
+// A log that holds a part of the model's trials is no other log: baselines that had learned from
+// the very trials that they predict would win.
+TEST_F(RunTest, BaselinesHaveSeenNoTrialThatTheyPredict) {
+  const std::string file = GAPFARM_SOURCE_DIR "/configs/demo/trials.csv";
+  auto model = nominal_model("srv1");
+  ASSERT_TRUE(model) << model.error().message;
+  const std::vector<std::string> files = {file};
+  TrialLog log = *read_trial_files(files, command_names(model->commands));
+  model->data.files = files;
+  model->data.trials = log.trials.size();
+  const auto note_of = [&](const TrialLog& of) {
+    const auto note = baseline_note(*model, of, std::vector<double>(of.trials.size(), 10.0));
+    EXPECT_TRUE(note) << note.error().message;
+    return *note;
+  };
+  TrialLog part = log, other = log;
+  part.trials.resize(log.trials.size() - 1);
+  for (Trial& trial : other.trials) trial.X_WE.x += 1e-3;
+  EXPECT_THAT(note_of(log), HasSubstr("other sessions or parts of the log"));
+  EXPECT_THAT(note_of(part), HasSubstr("other sessions or parts of the log"));
+  EXPECT_THAT(note_of(other), HasSubstr("learned from the model's trials"));
 }
 
 }  // namespace gapfarm::run_test
