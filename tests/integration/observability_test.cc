@@ -183,6 +183,10 @@ TEST_F(Observability, AnIndividualIsReplayedToTheBit) {
   const Finished unknown = gapfarm_command({"replay", folder_ / "run", "--genome", "999999"});
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.err, HasSubstr("999999"));
+  const Finished beyond =
+      gapfarm_command({"replay", folder_ / "run", "--genome", "best", "--generation", "999"});
+  EXPECT_EQ(beyond.exit_code, 2);
+  EXPECT_THAT(beyond.err, HasSubstr("--generation is 999, expected one of the run's, "));
 }
 
 }  // namespace gapfarm::observability_test

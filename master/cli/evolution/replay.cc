@@ -54,6 +54,13 @@ const StoredIndividual* first_that_ended_well(const Individuals& individuals) {
 Result<Found> find(const RunReader& reader, const ReplayOptions& options) {
   const auto& until = options.generation;
   const std::string run = reader.run().string();
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  if (until && !generations.empty() &&
+      (*until < generations.front().generation || *until > generations.back().generation)) {
+    return Error{fmt::format("{}: --generation is {}, expected one of the run's, {} to {}", run,
+                             *until, generations.front().generation,
+                             generations.back().generation)};
+  }
   if (options.genome == "best") {
     ASSIGN_OR_RETURN(auto best, latest(reader, until, first_that_ended_well));
     if (best) return *std::move(best);
