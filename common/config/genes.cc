@@ -196,8 +196,9 @@ class GeneReader {
     if (gene.lower >= gene.upper) {
       errors_.add(range, "gene " + parameter.key + " has the empty range [" +
                              table_.format(gene.row, gene.lower) + ", " +
-                             table_.format(gene.row, gene.upper) +
-                             "], expected lower < upper; fix a value in [parameters] instead");
+                             table_.format(gene.row, gene.upper) + "], expected lower < upper" +
+                             (gene.lower > gene.upper ? "; exchange the two"
+                                                      : "; fix a value in [parameters] instead"));
       return false;
     }
     return check_scale(range, gene);

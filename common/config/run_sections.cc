@@ -133,7 +133,7 @@ void read_evolution(TomlSection& section, EvolutionSettings& to) {
 }
 
 void read_farm(TomlSection& section, FarmSettings& to) {
-  section.read("workers", to.workers, 0, 1024);
+  section.read("workers", to.workers, 0, 4096);
   if (std::string listen = "ipc://"; section.find("listen") != nullptr) {
     section.read("listen", listen);
     if (!is_endpoint(listen)) {

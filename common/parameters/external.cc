@@ -5,6 +5,7 @@
 #include <set>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/parameters/ground.h"
 #include "common/parameters/rows.h"
 
@@ -95,22 +96,26 @@ Status check_row(const Parameter& p, bool runs) {
   const auto wrong = [&](const std::string& what) {
     return Error{"parameter '" + p.key + "' " + what};
   };
+  const auto number = [](double value) { return format_number(value, 17); };
+  const std::string bounds = " [" + number(p.lower) + ", " + number(p.upper) + "]";
   if (!is_key(p.key)) return wrong("needs a key of 1 to 64 letters, digits and _");
   if (is_taken(p.key, runs)) return wrong("has a name that gapfarm uses itself; choose another");
   if (!std::isfinite(p.lower) || !std::isfinite(p.upper) || !(p.lower < p.upper)) {
-    return wrong("needs finite bounds, lower below upper");
+    return wrong("has the bounds" + bounds + ", expected two finite numbers, lower below upper");
   }
   if (!(p.nominal >= p.lower && p.nominal <= p.upper)) {
-    return wrong("has a nominal value outside its bounds");
+    return wrong("has the nominal value " + number(p.nominal) + ", outside its bounds" + bounds);
   }
   if (p.scale == ParameterScale::kLog && !(p.lower > 0)) {
-    return wrong("has a log scale, so its lower bound must be more than 0");
+    return wrong("has a log scale and the lower bound " + number(p.lower) +
+                 ", expected more than 0");
   }
   if (p.kind == ParameterKind::kChoice) return check_choices(p.choices, wrong);
   if (p.kind != ParameterKind::kInteger) return {};
   if (p.lower != std::floor(p.lower) || p.upper != std::floor(p.upper) ||
       p.nominal != std::floor(p.nominal)) {
-    return wrong("is an integer, so its bounds and its nominal value must be whole numbers");
+    return wrong("is an integer with the nominal value " + number(p.nominal) + " and the bounds" +
+                 bounds + ", expected whole numbers");
   }
   if (p.scale == ParameterScale::kLog) {
     return wrong("is an integer, whose values are searched evenly; omit \"log\"");

@@ -44,7 +44,7 @@ TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
               HasSubstr("log scale"));
   EXPECT_THAT(error_of(declaration_with(
                   R"({"key": "n", "lower": 1, "upper": 2.5, "nominal": 1, "integer": true})")),
-              HasSubstr("must be whole numbers"));
+              HasSubstr("expected whole numbers"));
   EXPECT_THAT(error_of(declaration_with(
                   R"({"key": "n", "lower": 1, "upper": 9, "nominal": 1, "integer": true,
                       "log": true})")),
