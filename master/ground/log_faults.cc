@@ -29,12 +29,6 @@ bool all_alike(const std::vector<CommandedRun>& runs) {
       rows, [&](const CommandRow& row) { return row.values == rows.front().values; });
 }
 
-// Chained increments lie on no grid, whatever each was rounded to.
-PoseGrid grid_of(const RunLog& log) {
-  if (log.relative) return {};
-  return pose_grid(mapped(flattened(log.runs, &LoggedRun::poses), &PoseRow::X_WM));
-}
-
 // Frames that repeat the one before say where the robot was, not where it is: they go.
 void drop_stale_frames(GroundSearch* search) {
   // An increment of nothing is a motion that was not seen: no later one shows it.

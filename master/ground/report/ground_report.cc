@@ -29,7 +29,8 @@ class GroundReport {
         search_(search),
         options_(options),
         fitter_(robot, search.windows, search.reference, options.memo),
-        intervals_(fitter_.intervals(search.fit, options.seed)) {}
+        intervals_(fitter_.intervals(search.fit, options.seed)),
+        unseen_rows_(rows_not_shown(fitter_, search, options.seed)) {}
 
   GroundDiagnosis write() {
     faults();
@@ -220,7 +221,7 @@ class GroundReport {
     d_.verdict = ground_verdict(figures_);
     d_.findings.push_back(verdict_reason(figures_));
     if (!search_.stand_ins.empty()) d_.findings.push_back(nearest_of_catalogue(search_));
-    unseen_ = values_not_shown(fitter_, search_, options_.seed);
+    unseen_ = values_not_shown(search_, unseen_rows_);
     if (!unseen_.empty()) d_.cautions.push_back(unseen_);
     const std::string moved = values_that_would_move(search_);
     if (nothing_is_left(figures_)) {
@@ -348,6 +349,7 @@ class GroundReport {
       const Interval interval = {intervals_(j, 0), intervals_(j, 1)};
       // What fits move without its name predicts as well, but costs as many nats as a name.
       const bool known = search_.unexplained < kUnexplained &&
+                         !contains(unseen_rows_, row.row.name) &&
                          std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
                          (interval.lower > had || interval.upper < had);
       // Against a reference every value is the two logs' own.
@@ -369,6 +371,7 @@ class GroundReport {
   const GroundDiagnoseOptions& options_;
   WindowFitter fitter_;
   Eigen::MatrixX2d intervals_;
+  std::vector<std::string> unseen_rows_;
   std::string unseen_;  // which values no window shows; empty: none
   GroundDiagnosis result_;
   Diagnosis& d_ = result_.diagnosis;

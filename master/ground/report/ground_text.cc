@@ -263,19 +263,27 @@ std::string nearest_of_catalogue(const GroundSearch& search) {
       search.smooth->depends_on);
 }
 
-std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& search,
-                             std::uint64_t seed) {
+std::vector<std::string> rows_not_shown(const WindowFitter& fitter, const GroundSearch& search,
+                                        std::uint64_t seed) {
   const WindowFit& fit = search.free_fit;
   const Eigen::MatrixXd draws = fitter.draws(fit, seed).colwise() - fit.values;
   const double root = std::sqrt(static_cast<double>(draws.cols()));
-  std::vector<std::string> things;
+  std::vector<std::string> names;
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     const std::string& name = fit.rows[k].row.name;
     const Eigen::Index named = row_index(search.fit.rows, name);
     if (named >= 0 && search.fit.rows[named].free) continue;
     // What lies before measured wheel speeds is a caution of its own.
     if (fitter.robot().measured && (name == "lag" || name == "delay")) continue;
-    if (draws.row(k).norm() / root < kUnshown * prior_deviation(fit.rows[k])) continue;
+    if (draws.row(k).norm() / root >= kUnshown * prior_deviation(fit.rows[k]))
+      names.push_back(name);
+  }
+  return names;
+}
+
+std::string values_not_shown(const GroundSearch& search, const std::vector<std::string>& rows) {
+  std::vector<std::string> things;
+  for (const std::string& name : rows) {
     const GroundHypothesis* of = find_by(search.catalogue, true, [&](const GroundHypothesis& h) {
       return contains(h.freed, name, &KinematicRow::name);
     });

@@ -73,10 +73,12 @@ std::string nearest_of_catalogue(const GroundSearch& search);
 // first: at which horizon it is largest, and from when on in the log, where one half holds it.
 std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search);
 
-// "These runs do not show whether these are right: the distance between the sides.", of values that
-// the log leaves as unsure as they were before it; empty: there are none.
-std::string values_not_shown(const WindowFitter& fitter, const GroundSearch& search,
-                             std::uint64_t seed);
+// Names of values that the log leaves as unsure as they were before it.
+std::vector<std::string> rows_not_shown(const WindowFitter& fitter, const GroundSearch& search,
+                                        std::uint64_t seed);
+// "These runs do not show whether these are right: the distance between the sides.", of these rows;
+// empty: there are none.
+std::string values_not_shown(const GroundSearch& search, const std::vector<std::string>& rows);
 
 // Values that would move most, each more than two of its tolerances, were all of them free; empty:
 // none.  "separation by -3.1 %, lag by +0.05 s".

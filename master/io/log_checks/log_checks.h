@@ -13,6 +13,7 @@
 #include "common/pose/pose.h"
 #include "common/problem/problem.h"
 #include "common/recordings/run.h"
+#include "common/trials/pose_readings.h"
 #include "common/trials/trial.h"
 
 namespace gapfarm {
@@ -143,6 +144,9 @@ void check_gyro(const RunLog& log, RunChecks* checks);
 // another one's copy; stretches without any pose; commands that are older than the robot's timeout;
 // a gyro of another sign, unit or clock than the headings.
 RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s = {});
+
+// That the poses are rounded to.  Chained increments lie on none, whatever each was rounded to.
+PoseGrid grid_of(const RunLog& log);
 
 // Poses that the tracker took from elsewhere, for they jump there and back.  REQUIRES: headings in
 // radians.

@@ -26,7 +26,8 @@ constexpr double kTimesUsualGap = 50;
 constexpr double kManyStale = 0.1;  // of the time that a robot is commanded to drive
 // Of a step, over what four in five are and over those about it: no robot gathers speed so fast.
 constexpr double kTimesUsualStep = 20;
-constexpr double kLeastJump_m = 0.1;  // coarse grids step by less, with none in between
+constexpr double kLeastJump_m = 0.1;
+constexpr double kLeastGridSteps = 3;  // coarse grids step by one and aside, with none in between
 constexpr double kLeastTurn_rad = 0.5, kMostTurn_rad = 1.57;
 constexpr double kTimesAStep = 3;       // where half a turn is no more than a few of them
 constexpr std::size_t kNeighbours = 4;  // either way
@@ -340,9 +341,15 @@ RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s) {
   return checks;
 }
 
+PoseGrid grid_of(const RunLog& log) {
+  if (log.relative) return {};
+  return pose_grid(mapped(flattened(log.runs, &LoggedRun::poses), &PoseRow::X_WM));
+}
+
 RunChecks check_jumps(const RunLog& log) {
   RunChecks checks;
   if (log.relative) return checks;
+  const double least_m = std::max(kLeastJump_m, kLeastGridSteps * grid_of(log).step_m);
   const auto report = [&](double least, double most, const char* name, const char* what,
                           const char* unit, const Length& length) {
     const Jumps jumps = jumps_of(log, least, most, length);
@@ -362,7 +369,7 @@ RunChecks check_jumps(const RunLog& log) {
          "jump as another run.",
          Severity::kNote});
   };
-  report(kLeastJump_m, INFINITY, "pose_jumps", "Positions", "m",
+  report(least_m, INFINITY, "pose_jumps", "Positions", "m",
          [](const Pose& a, const Pose& b) { return std::hypot(b.x - a.x, b.y - a.y); });
   report(kLeastTurn_rad, kMostTurn_rad, "heading_jumps", "Headings", "rad",
          [](const Pose& a, const Pose& b) { return std::abs(wrap_angle(b.theta - a.theta)); });
