@@ -184,11 +184,15 @@ const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
 double closed_by_fault() { return 3 * std::log(kFaultShrinks); }
 
 // A hypothesis of values that every fit moves has nothing to gain by being free; beside a file that
-// stands as it is it may explain most.
+// stands as it is it may explain most, or all but what is tolerated.
 std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, const GroundWork& work,
                                                 const GroundSearch& search) {
   const WindowFit& file = search.chain.front();
-  if (mean(search.fit.nats) - mean(file.nats) < closed_by_fault()) return std::nullopt;
+  const WindowFit moved = fit_held_out(fitter, search.fit.rows, search.fit.values);
+  const auto gain = [&](const WindowFit& with, const WindowFit& without) {
+    return held_out_gain(fitter.windows(), with, without, work.seed);
+  };
+  if (gain(moved, file).lo < kToleratedGap) return std::nullopt;
   const double as_it_stands = fitter.hold({}, {}).objective;
   std::optional<Candidate> best;
   for (std::size_t i = 0; i < search.catalogue.size(); ++i) {
@@ -202,10 +206,16 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     const WindowFit alone = fitter.fit(with_freed({}, hypothesis, &values), {}, values);
     c.held_out = fit_held_out(fitter, alone.rows, alone.values);
     c.before = file;
-    c.held_out_gain = held_out_gain(fitter.windows(), c.held_out, file, work.seed);
+    c.held_out_gain = gain(c.held_out, file);
     c.offer.gain = alone.objective - as_it_stands;
-    if (c.held_out_gain.lo < closed_by_fault()) continue;
-    if (best && !(c.held_out_gain.mean > best->held_out_gain.mean)) continue;
+    const bool all = gain(moved, c.held_out).hi < kToleratedGap;
+    if (c.held_out_gain.lo < (all ? kToleratedGap : closed_by_fault())) continue;
+    if (best) {
+      const HeldOutGain over = gain(c.held_out, best->held_out);
+      const bool longer =
+          hypothesis.freed.size() > search.catalogue[best->offer.hypothesis].freed.size();
+      if (!((longer ? over.lo : over.mean) > 0)) continue;
+    }
     values = search.fit.values;
     const std::vector<FitRow> rows = with_freed(search.fit.rows, hypothesis, &values);
     c.fit = fitter.fit(rows, {}, values);
@@ -213,6 +223,16 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     if (c.may_be_named) best = std::move(c);
   }
   return best;
+}
+
+// What a well-kept file is off by needs no name; what changed is compared with what is kept.
+bool is_off(const GroundSearch& search, const Candidate& c) {
+  const GroundHypothesis& h = search.catalogue[c.offer.hypothesis];
+  return search.reference || h.describe ||
+         std::ranges::any_of(h.freed, [&](const KinematicRow& row) {
+           const Eigen::Index i = row_index(c.fit.rows, row.name);
+           return std::abs(c.fit.values[i] - row.nominal) > row.tolerance;
+         });
 }
 
 // The best of the catalogue, when it is worth its name.
@@ -237,7 +257,7 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     tried.pop_back();
   }
   const auto shown = [&](const Candidate& c) {
-    return shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit);
+    return is_off(*search, c) && shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit);
   };
   const bool further = !search->steps.empty();
   for (Candidate& c : tried) {
@@ -281,33 +301,6 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   emit_steps(work, *search);
   return true;
 }
-
-}  // namespace
-
-double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
-               const WindowFit& with, const WindowFit& without) {
-  const double gain =
-      hypothesis.gain ? hypothesis.gain(fitter, with, without) : with.objective - without.objective;
-  const double more_values = static_cast<double>(hypothesis.freed.size()) - 1;
-  return gain - (kPriceOfAValue * more_values + hypothesis.price);
-}
-
-std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,
-                               Eigen::VectorXd* values) {
-  for (const KinematicRow& freed : hypothesis.freed) {
-    const Eigen::Index at = row_index(rows, freed.name);
-    if (at >= 0) {
-      rows[at].free = true;
-      continue;
-    }
-    rows.push_back({freed, true});
-    values->conservativeResize(rows.size());
-    (*values)[values->size() - 1] = freed.nominal;
-  }
-  return rows;
-}
-
-namespace {
 
 // Whether a value that has no name moved by more than a robot changes from log to log, and than the
 // reference leaves open.
@@ -375,6 +368,15 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   emit_steps(work, search);
   stage(kRestStage);
   measure_rest(fitter, work, &search);
+  if (!search.steps.empty() && !search.reference && !named_far(search.fit)) {
+    const HeldOutGain all =
+        held_out_gain(search.windows, search.best, search.chain.front(), work.seed);
+    if (all.hi < kToleratedGap) {
+      // However sure names are of it, the file is as good as is tolerated.
+      static_cast<GroundNames&>(search) = unnamed;
+      measure_rest(fitter, work, &search);
+    }
+  }
   search.unexplained = share_unexplained(fitter, search.best);
   if (search.unexplained >= kUnexplained && !question.catalogue.empty()) {
     // What fits a little better then is a name for nothing.

@@ -195,6 +195,9 @@ std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search)
 bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
                     std::size_t index, const WindowFit& fit);
 
+// Whether a value that has a name is farther off than a well-kept file's.
+bool named_far(const WindowFit& fit);
+
 // The file with these hypotheses put right, predicting what was not fitted; fits begin where `fit`
 // ended.
 WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,

@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "common/base/ranges.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/search.h"
+#include "master/infer/settings.h"
 
 namespace gapfarm {
 namespace {
@@ -76,6 +79,37 @@ void drop_where_not(const WindowFitter& fitter, const GroundWork& work, const Gr
 }
 
 }  // namespace
+
+double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
+               const WindowFit& with, const WindowFit& without) {
+  const double gain =
+      hypothesis.gain ? hypothesis.gain(fitter, with, without) : with.objective - without.objective;
+  const double more_values = static_cast<double>(hypothesis.freed.size()) - 1;
+  return gain - (kPriceOfAValue * more_values + hypothesis.price);
+}
+
+std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,
+                               Eigen::VectorXd* values) {
+  for (const KinematicRow& freed : hypothesis.freed) {
+    const Eigen::Index at = row_index(rows, freed.name);
+    if (at >= 0) {
+      rows[at].free = true;
+      continue;
+    }
+    rows.push_back({freed, true});
+    values->conservativeResize(rows.size());
+    (*values)[values->size() - 1] = freed.nominal;
+  }
+  return rows;
+}
+
+bool named_far(const WindowFit& fit) {
+  return std::ranges::any_of(indices(fit.rows.size()), [&](std::size_t k) {
+    const auto& [row, free] = fit.rows[k];
+    const double off = std::abs(fit.values[static_cast<Eigen::Index>(k)] - row.nominal);
+    return free && off > kFarTolerances * row.tolerance;
+  });
+}
 
 bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
                     std::size_t index, const WindowFit& fit) {

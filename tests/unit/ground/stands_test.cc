@@ -77,5 +77,50 @@ TEST(Stands, ALagOfDrivenWheelsIsNoRamp) {
   EXPECT_GT(tau.hi, 0.03);
 }
 
+Diagnosis diagnosed(const GroundRobot& robot, const RunLog& log) {
+  auto result = diagnose_ground(robot, log, {});
+  EXPECT_TRUE(result.ok()) << result.error().message;
+  return result->diagnosis;
+}
+
+RunLog with_noise(RunLog log, double m, double rad) {
+  Stream stream({9, Purpose::kTest, 0, 0, 0});
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses) {
+      row.X_WM.x += m * stream.normal();
+      row.X_WM.y += m * stream.normal();
+      row.X_WM.theta += rad * stream.normal();
+    }
+  }
+  return log;
+}
+
+// What closes less than is tolerated, and is little, needs no name, however sure a long log is.
+TEST(DiagnoseGround, NamesNothingWhileTheGapIsTolerated) {
+  const GroundRobot robot = robot_of(kDifferential);
+  for (const double right : {1.004, 1.006, 1.02}) {
+    const RunLog log = with_noise(driven(robot, off_by({"right"}, {right})), 0.01, 0.02);
+    const Diagnosis d = diagnosed(robot, log);
+    EXPECT_EQ(d.effects.empty(), right < 1.02) << right << ": " << d.headline;
+    EXPECT_EQ(d.verdict, right < 1.02 ? Verdict::kNone : Verdict::kEffect) << right;
+  }
+}
+
+// One value that is off by what a well-kept file may be, but explains all that is missing, is
+// named, and no more of them than it takes.
+TEST(DiagnoseGround, NamesWhatAloneClosesTheGap) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const Diagnosis wheel = diagnosed(robot, driven(robot, off_by({"right"}, {1.002})));
+  ASSERT_EQ(wheel.effects.size(), 1u) << wheel.headline;
+  ASSERT_EQ(wheel.effects[0].parameters.size(), 1u) << wheel.headline;
+  EXPECT_NEAR(wheel.effects[0].parameters[0].value, 0.002, 3e-4);
+  EXPECT_EQ(wheel.verdict, Verdict::kEffect);
+  const GroundRobot tricycle = robot_of(kTricycle);
+  const Diagnosis marker = diagnosed(tricycle, driven(tricycle, off_by({"marker_y"}, {0.01})));
+  ASSERT_EQ(marker.effects.size(), 1u) << marker.headline;
+  EXPECT_EQ(marker.effects[0].name, "marker_offset");
+  EXPECT_NEAR(marker.effects[0].parameters[1].value, 0.01, 1e-3);
+}
+
 }  // namespace
 }  // namespace gapfarm
