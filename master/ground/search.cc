@@ -373,7 +373,9 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
         held_out_gain(search.windows, search.best, search.chain.front(), work.seed);
     if (all.hi < kToleratedGap) {
       // However sure names are of it, the file is as good as is tolerated.
-      static_cast<GroundNames&>(search) = unnamed;
+      GroundNames none = unnamed;
+      none.offers = {search.offers.front()};
+      static_cast<GroundNames&>(search) = std::move(none);
       measure_rest(fitter, work, &search);
     }
   }

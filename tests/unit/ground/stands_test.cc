@@ -103,6 +103,7 @@ TEST(DiagnoseGround, NamesNothingWhileTheGapIsTolerated) {
     const Diagnosis d = diagnosed(robot, log);
     EXPECT_EQ(d.effects.empty(), right < 1.02) << right << ": " << d.headline;
     EXPECT_EQ(d.verdict, right < 1.02 ? Verdict::kNone : Verdict::kEffect) << right;
+    EXPECT_FALSE(d.screening.empty()) << right;
   }
 }
 
