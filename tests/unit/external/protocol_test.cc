@@ -36,7 +36,7 @@ TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
   EXPECT_THAT(error_of(declaration_with(R"({"key": "m", "lower": 1, "upper": 1, "nominal": 1})")),
               HasSubstr("lower below upper"));
   EXPECT_THAT(error_of(declaration_with(R"({"key": "m", "lower": 1, "upper": "2", "nominal": 1})")),
-              HasSubstr("finite bounds"));
+              HasSubstr("expected two finite numbers"));
   EXPECT_THAT(error_of(declaration_with(R"({"key": "m", "lower": 1, "upper": 2, "nominal": 3})")),
               HasSubstr("outside its bounds"));
   EXPECT_THAT(error_of(declaration_with(
