@@ -283,8 +283,8 @@ inline constexpr double kEvenMotion = 0.1;
 inline constexpr double kLeastStaleShare = 0.03;
 // scatter of the shortest windows | derived: a tenth of its variance | Rounding is named.
 inline constexpr double kLeastRounding = 0.3;
-// how far the wheels reach | chosen: trackers of the robots at hand write 0.01 and less | Rounding
-// is named whatever it adds to the scatter.
+// how far the wheels reach | chosen: logs of the cases have grids of 0.001 and less | Rounding is
+// named whatever it adds to the scatter.
 inline constexpr double kCoarseRounding = 0.05;
 // the file's value | round | A robot of less is another robot, and one of none or of the opposite
 // sign none at all.
