@@ -225,16 +225,6 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
   return best;
 }
 
-// What a well-kept file is off by needs no name; what changed is compared with what is kept.
-bool is_off(const GroundSearch& search, const Candidate& c) {
-  const GroundHypothesis& h = search.catalogue[c.offer.hypothesis];
-  return search.reference || h.describe ||
-         std::ranges::any_of(h.freed, [&](const KinematicRow& row) {
-           const Eigen::Index i = row_index(c.fit.rows, row.name);
-           return std::abs(c.fit.values[i] - row.nominal) > row.tolerance;
-         });
-}
-
 // The best of the catalogue, when it is worth its name.
 bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
   std::vector<Candidate> tried;
@@ -256,8 +246,11 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   while (!tried.empty() && (tried.back().gain() < worth || tried.size() > kLeaders)) {
     tried.pop_back();
   }
+  // What a well-kept file is off by needs no name; what changed is compared with what is kept.
   const auto shown = [&](const Candidate& c) {
-    return is_off(*search, c) && shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit);
+    const GroundHypothesis& h = search->catalogue[c.offer.hypothesis];
+    return (search->reference || h.describe || tolerances_off(h, c.fit) > 1) &&
+           shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit);
   };
   const bool further = !search->steps.empty();
   for (Candidate& c : tried) {
@@ -368,7 +361,10 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   emit_steps(work, search);
   stage(kRestStage);
   measure_rest(fitter, work, &search);
-  if (!search.steps.empty() && !search.reference && !named_far(search.fit)) {
+  const bool far = std::ranges::any_of(search.steps, [&](const GroundStep& step) {
+    return tolerances_off(search.catalogue[step.chosen], search.fit) > kFarTolerances;
+  });
+  if (!search.steps.empty() && !search.reference && !far) {
     const HeldOutGain all =
         held_out_gain(search.windows, search.best, search.chain.front(), work.seed);
     if (all.hi < kToleratedGap) {

@@ -195,8 +195,9 @@ std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search)
 bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
                     std::size_t index, const WindowFit& fit);
 
-// Whether a value that has a name is farther off than a well-kept file's.
-bool named_far(const WindowFit& fit);
+// How far the farthest of a hypothesis' values is off, in tolerances of a well-kept file.
+// REQUIRES: the fit has them.
+double tolerances_off(const GroundHypothesis& hypothesis, const WindowFit& fit);
 
 // The file with these hypotheses put right, predicting what was not fitted; fits begin where `fit`
 // ended.

@@ -103,11 +103,9 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
   return rows;
 }
 
-bool named_far(const WindowFit& fit) {
-  return std::ranges::any_of(indices(fit.rows.size()), [&](std::size_t k) {
-    const auto& [row, free] = fit.rows[k];
-    const double off = std::abs(fit.values[static_cast<Eigen::Index>(k)] - row.nominal);
-    return free && off > kFarTolerances * row.tolerance;
+double tolerances_off(const GroundHypothesis& hypothesis, const WindowFit& fit) {
+  return max_of(hypothesis.freed, [&](const KinematicRow& row) {
+    return std::abs(fit.values[row_index(fit.rows, row.name)] - row.nominal) / row.tolerance;
   });
 }
 
