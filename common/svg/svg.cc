@@ -73,11 +73,6 @@ void Svg::polyline(const std::vector<SvgPoint>& points, const SvgStyle& style, b
   body_ += "\"" + styled(style) + "/>\n";
 }
 
-void Svg::rectangle(SvgPoint corner, double width, double height, const SvgStyle& style) {
-  body_ += "<rect" + attribute("x", corner.x) + attribute("y", corner.y) +
-           attribute("width", width) + attribute("height", height) + styled(style) + "/>\n";
-}
-
 void Svg::circle(SvgPoint centre, double radius, const SvgStyle& style) {
   body_ += "<circle" + attribute("cx", centre.x) + attribute("cy", centre.y) +
            attribute("r", radius) + styled(style) + "/>\n";

@@ -37,7 +37,6 @@ class Svg {
 
   void line(SvgPoint from, SvgPoint to, const SvgStyle& style);
   void polyline(const std::vector<SvgPoint>& points, const SvgStyle& style, bool closed = false);
-  void rectangle(SvgPoint corner, double width, double height, const SvgStyle& style);
   void circle(SvgPoint centre, double radius, const SvgStyle& style);
   void text(SvgPoint place, std::string_view content, const SvgText& how);
   // What comes before the next end_part() is cut at the rectangle.
