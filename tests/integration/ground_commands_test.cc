@@ -176,8 +176,10 @@ TEST_F(GroundCommands, ARunAndADiagnosisGoOnFromAnyFolder) {
   EXPECT_THAT(text_of(folder_ / "run/report.html"), HasSubstr("gapfarm horizons ../run --trials"));
   EXPECT_THAT(resumed.err, Not(HasSubstr("has changed")));
   folder_.write("robot.toml", text_of(robot_) + "# another\n");
+  folder_.write("car.toml", text_of(folder_ / "car.toml") + "# another\n");
   const Finished changed = shell("\"$G\" resume run --generations 3 --workers 1");
   EXPECT_EQ(changed.exit_code, 0) << changed.err;
+  EXPECT_THAT(changed.err, HasSubstr("car.toml has changed since the run began"));
   EXPECT_THAT(changed.err, HasSubstr("robot.toml has changed since the run began"));
 }
 

@@ -24,7 +24,13 @@ struct ResumeCommand {
 
 // A run goes on with the robot that it began with.  What a program declares may be as it was, and
 // what it computes another thing.
-void note_changes(const Config& config, const std::string& began, Console& console) {
+void note_changes(const Config& config, const RunInfo& info, Console& console) {
+  const auto text = read_text_file(info.config_path);
+  if (!info.config_path.empty() && text && *text != info.config_text) {
+    console.note(info.config_path +
+                 " has changed since the run began, which goes on as it was but for the options "
+                 "of this command; `gapfarm evolve` takes the file as it is");
+  }
   const auto robot = read_text_file(config.robot_path);
   if (!config.robot_path.empty() && robot && *robot != config.problem.robot_file) {
     console.note(config.robot_path +
@@ -38,7 +44,7 @@ void note_changes(const Config& config, const std::string& began, Console& conso
     const std::string path = std::filesystem::path(command.folder) / argument;
     if (stat(path.c_str(), &file) != 0 || !S_ISREG(file.st_mode)) continue;
     const std::string written = utc_text(static_cast<double>(file.st_mtime), kStoredTime);
-    if (written <= began) continue;
+    if (written <= info.created) continue;
     console.note(path +
                  " was written after the run began: unless it computes the same, scores of "
                  "before and of now cannot be compared; begin another run by `gapfarm evolve`");
@@ -107,7 +113,7 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
   ASSIGN_OR_RETURN(const auto generations, reader.generations());
   ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
-  note_changes(config, reader.info().created, context.console);
+  note_changes(config, reader.info(), context.console);
   const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
   const std::uint64_t from = std::min(command.branch.generation.value_or(last), last);
   return print_evolution_dry_run(
@@ -124,7 +130,7 @@ Result<int> run_branch(ResumeCommand& command, CliContext& context) {
   const auto overrides =
       EvolutionOverrides::from_json(merged_overrides(reader.info(), command.options.overrides));
   ASSIGN_OR_RETURN(Config config, stored_config(reader.info(), overrides));
-  note_changes(config, reader.info().created, context.console);
+  note_changes(config, reader.info(), context.console);
   RETURN_IF_ERROR(branch_off(reader, command.branch, config));
   RETURN_IF_ERROR(check_runnable(config));
   RETURN_IF_ERROR(check_program(config, command.run));
@@ -161,7 +167,7 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
   context.begun = true;
   const Result<Config> config = stored_config(store.info(), command.options.overrides);
   if (!config) return stopped_by(store, {command.run + ": " + config.error().message});
-  note_changes(*config, store.info().created, context.console);
+  note_changes(*config, store.info(), context.console);
   if (command.branch.generation) {
     const auto kept = store.truncate_after(*command.branch.generation);
     if (!kept) return stopped_by(store, kept.error());
