@@ -181,7 +181,10 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
   top.read("name", robot.name);
   top.read("drive", robot.drive, drive_names());
   if (!parsed.contains("drive")) {
-    return Error{path + ": no key 'drive', expected one of " + joined(drive_names())};
+    return Error{path + ": no key 'drive', expected one of " + joined(drive_names()) +
+                 (parsed.contains("scenario") || parsed.contains("genes")
+                      ? "; it looks like a config: give the file that its [robot] file names"
+                      : "")};
   }
   read_commands(top, robot);
   top_rows(top, robot);

@@ -345,10 +345,10 @@ Error no_run_in(const std::filesystem::path& folder) {
     return {name + ": holds no run, but what this command left, which goes on with it: " +
             (*other)->arguments};
   }
-  return {name +
-          ": holds no run (there is no run.sqlite); give the folder that --out named, or "
-          "start one with `gapfarm evolve CONFIG --out " +
-          name + "`"};
+  const bool is_file = std::filesystem::is_regular_file(folder);
+  return {name + (is_file ? ": is no folder of a run" : ": holds no run (there is no run.sqlite)") +
+          "; give the folder that --out named, or start one with `gapfarm evolve " +
+          (is_file ? name + " --out FOLDER`" : "CONFIG --out " + name + "`")};
 }
 
 }  // namespace gapfarm

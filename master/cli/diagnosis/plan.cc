@@ -9,6 +9,7 @@
 #include "master/cli/diagnosis/plan_drive.h"
 #include "master/cli/subcommand.h"
 #include "master/diagnose/conclusions/findings.h"
+#include "master/experiments/blind_check/cases/sizing.h"
 
 namespace gapfarm {
 namespace {
@@ -66,6 +67,7 @@ Status apply_options(PlanOptions& options, Config& config) {
                     options.settings.trials, s.chain, s.sessions)};
   }
   std::erase(options.settings.effects, "all");
+  RETURN_IF_ERROR(effects_named(config.problem.table(), options.settings.effects));
   return {};
 }
 

@@ -68,6 +68,10 @@ Result<Page> page_of_run(const std::filesystem::path& run) {
 }
 
 Result<Page> page_of(const std::filesystem::path& from) {
+  if (is_there(from) && !is_folder(from) && from.extension() != ".json") {
+    return Error{from.string() +
+                 ": is no diagnosis.json; give one, or the folder of a run or of a diagnosis"};
+  }
   if (!is_folder(from)) return page_of_diagnosis(from);
   if (is_there(from / "diagnosis.json")) return page_of_diagnosis(from / "diagnosis.json");
   if (is_there(from / "run.sqlite")) return page_of_run(from);

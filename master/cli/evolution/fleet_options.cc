@@ -130,6 +130,7 @@ Result<ClusterSite> FleetChoice::read_site() const {
 }
 
 Status FleetChoice::check() const {
+  ASSIGN_OR_RETURN([[maybe_unused]] const ClusterSite read, read_site());
   if (limits.max_workers < std::max(limits.min_workers, limits.workers_per_job)) {
     return Error{"--max " + std::to_string(limits.max_workers) +
                  " is less than --min or than the " + std::to_string(limits.workers_per_job) +
@@ -138,7 +139,6 @@ Status FleetChoice::check() const {
   if (!wall_time.empty()) {
     ASSIGN_OR_RETURN([[maybe_unused]] const double seconds, wall_time_s(wall_time));
   }
-  ASSIGN_OR_RETURN([[maybe_unused]] const ClusterSite read, read_site());
   return {};
 }
 
