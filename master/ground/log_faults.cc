@@ -231,6 +231,7 @@ std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
   std::vector<std::vector<double>> of_runs(windows.run_blocks.size());
   for (std::size_t i = 0; i < missed.size(); ++i) of_runs[windows.run_of[i]].push_back(missed[i]);
   std::vector<std::string> far;
+  bool all_own = true;
   for (std::size_t r = 0; r < of_runs.size(); ++r) {
     std::vector<double> others;
     for (std::size_t other = 0; other < of_runs.size(); ++other) {
@@ -241,14 +242,16 @@ std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
     const bool has_own = times > kFaultShrinks && !windows.simulated && !search.reference &&
                          own_values_shrink(fitter, search, r) > kFaultShrinks;
     if (!has_own && !(times > kFarRun)) continue;
+    all_own = all_own && has_own;
     far.push_back(fmt::format("Run {} misses by {:.1f} times as much as the others{}.",
                               search.log.runs[r].run, times,
                               has_own ? ", and other values fit it" : ""));
   }
   if (far.empty()) return far_windows(fitter, search, missed);
   return joined(far, " ") +
-         " Look at the commands and the poses of these: another run's, the other way round, or "
-         "something that happened there alone.";
+         (all_own ? " Something was other in these: floor, load, mark, clock or the robot itself."
+                  : " Look at the commands and the poses of these: another run's, the other way "
+                    "round, or something that happened there alone.");
 }
 
 std::string unconfirmed_part(const GroundSearch& search) {
