@@ -134,7 +134,7 @@ class LinkGuard::Watch {
     std::vector<zmq::message_t> request;
     while (receive_parts(zap_, &request)) {
       std::string user;
-      const bool allowed = request.size() == 7 && judge(request, &user);
+      const bool allowed = request.size() >= 6 && judge(request, &user);
       const std::array<std::string, 6> reply = {"1.0",
                                                 request.size() > 1 ? text_of(request[1]) : "",
                                                 allowed ? "200" : "400",
@@ -148,10 +148,12 @@ class LinkGuard::Watch {
     }
   }
 
-  // version, request, domain, address, routing id, mechanism, credentials
+  // version, request, domain, address, routing id, mechanism, and credentials of CURVE
   bool judge(const std::vector<zmq::message_t>& request, std::string* user) {
-    if (text_of(request[0]) != "1.0" || text_of(request[2]) != kZapDomain ||
-        text_of(request[5]) != "CURVE" || request[6].size() != 32) {
+    const std::string domain = text_of(request[2]), mechanism = text_of(request[5]);
+    if (domain == kOpenDomain) return mechanism == "NULL";
+    if (text_of(request[0]) != "1.0" || domain != kZapDomain || mechanism != "CURVE" ||
+        request.size() != 7 || request[6].size() != 32) {
       return false;
     }
     std::array<char, 41> key = {};

@@ -18,6 +18,7 @@
 namespace gapfarm {
 
 inline constexpr const char* kZapDomain = "gapfarm";
+inline constexpr const char* kOpenDomain = "gapfarm-open";  // of endpoints without keys
 
 // The allow-list of worker keys (ZAP, RFC 27): asked once a handshake, read again when it may have
 // changed, empty when it cannot be read.

@@ -144,14 +144,15 @@ void configure(zmq::socket_t& socket, const SocketOptions& options) {
   socket.set(zmq::sockopt::reconnect_ivl, milliseconds(options.reconnect_min_s));
   socket.set(zmq::sockopt::reconnect_ivl_max, milliseconds(options.reconnect_max_s));
   socket.set(zmq::sockopt::backlog, 1024);
-  socket.set(zmq::sockopt::ipv6, false);
 }
 
 bool is_tcp(const std::string& endpoint) { return endpoint.rfind("tcp://", 0) == 0; }
 
+bool is_ipv6(const std::string& endpoint) { return endpoint.starts_with("tcp://["); }
+
 bool is_loopback(const std::string& endpoint) {
   const std::string host = endpoint.substr(6, endpoint.rfind(':') - 6);
-  return host == "localhost" ||
+  return host == "localhost" || host == "[::1]" ||
          (host.rfind("127.", 0) == 0 && host.find_first_not_of("0123456789.") == std::string::npos);
 }
 
@@ -184,11 +185,10 @@ LinkLimits within_descriptors(LinkLimits limits) {
 void secure_server(zmq::socket_t& socket, const LinkSecurity& security, bool curve) {
   socket.set(zmq::sockopt::curve_server, curve);
   if (curve) {
-    socket.set(zmq::sockopt::zap_domain, kZapDomain);
     socket.set(zmq::sockopt::curve_secretkey, security.own->secret_key);
-  } else {
-    zmq_setsockopt(socket.handle(), ZMQ_ZAP_DOMAIN, nullptr, 0);  // empty
   }
+  // Of its own: libzmq 4.3.4 cannot set a domain back to none.
+  socket.set(zmq::sockopt::zap_domain, curve ? kZapDomain : kOpenDomain);
 }
 
 void secure_client(zmq::socket_t& socket, const LinkSecurity& security) {
@@ -292,6 +292,7 @@ Result<std::string> RouterSocket::bind(const std::string& endpoint) {
   try {
     secure_server(impl_->socket, security, is_tcp(endpoint) && security.open == OpenLinks::kNever);
     const PrivateFiles only_ours;  // nobody else may connect to a socket in the file system
+    impl_->socket.set(zmq::sockopt::ipv6, is_ipv6(endpoint));
     impl_->socket.bind(endpoint);
     return impl_->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& error) {
@@ -355,6 +356,7 @@ Result<std::unique_ptr<DealerSocket>> DealerSocket::connect(const std::string& e
     impl->socket = zmq::socket_t(impl->context, zmq::socket_type::dealer);
     configure(impl->socket, options);
     impl->socket.set(zmq::sockopt::immediate, true);
+    impl->socket.set(zmq::sockopt::ipv6, is_ipv6(endpoint));
     if (is_tcp(endpoint) && !open) secure_client(impl->socket, security);
     impl->watch = std::make_unique<HandshakeWatch>(impl->context, impl->socket, endpoint,
                                                    options.reconnect_max_s);

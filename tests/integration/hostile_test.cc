@@ -246,6 +246,12 @@ TEST_F(Hostile, ARunUnderAttackEndsAsIfNobodyHadBeenThere) {
   EXPECT_EQ(digest("hostile"), digest("calm"));
 }
 
+TEST_F(Hostile, LocalWorkersWorkBesideAnEndpointWithKeys) {
+  const Finished both = gapfarm_command(
+      evolve("both", {"--workers", "1", "--keys", keys_, "--listen", "tcp://127.0.0.1:*"}));
+  EXPECT_EQ(both.exit_code, 0) << both.err;
+}
+
 TEST(Keys, ThatCannotBeAreWrongInput) {
   const TemporaryFolder folder;
   const std::string keys = folder / "keys", file = folder.write("file", "");
