@@ -86,9 +86,10 @@ Result<int> serve(const ServiceOptions& options, EvaluationThread& evaluation, S
 // end; the new one reports to the master how the old one ended, so that a task that kills workers
 // is found out.  Passes a first and a second stop request on.  Returns when asked to stop, or all
 // have left by themselves: 0, or kExitNoMaster when one did for that; error: none could be kept
-// alive.  `arguments` are for every worker, beside what says who it is.  By `deadline_s`, of the
-// monotonic clock, the workers have gone: they are asked to go, and none is started again after it.
-// REQUIRES: a prefix of names that is unique on the farm; the pool's own arguments are not used.
+// alive, or one was refused.  `arguments` are for every worker, beside what says who it is.  By
+// `deadline_s`, of the monotonic clock, the workers have gone: they are asked to go, and none is
+// started again after it. REQUIRES: a prefix of names that is unique on the farm; the pool's own
+// arguments are not used.
 Result<int> supervise(ProcessPoolOptions pool, const std::vector<std::string>& arguments,
                       double deadline_s, StopSource& stop);
 

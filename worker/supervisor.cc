@@ -53,7 +53,7 @@ Result<int> supervise(ProcessPoolOptions options, const std::vector<std::string>
   ProcessPool pool(std::move(options));
   RETURN_IF_ERROR(pool.start(monotonic_seconds()));
   unsigned stops = 0;
-  bool no_master = false;
+  bool no_master = false, refused = false;
   std::string last_end;
   while (!pool.exhausted()) {
     if (stop.requests() != stops) {
@@ -68,13 +68,14 @@ Result<int> supervise(ProcessPoolOptions options, const std::vector<std::string>
       if (stops > 0) continue;
       last_end = end.text;
       no_master |= end.exit_status == kExitNoMaster;
+      refused |= end.exit_status == kExitRefused;
       std::fprintf(stderr, "gapfarm-worker: %s%s\n", end.text.c_str(),
                    end.gave_up ? "; it is not started again" : "");
     }
     wait_for(pool, stop, std::clamp(pool.next_start() - now, 0.0, pool.look_interval()));
   }
   if (stops == 0 && no_master) return kExitNoMaster;
-  if (stops > 0 || mortal) return 0;
+  if (stops > 0 || (mortal && !refused)) return 0;
   return Error{"no worker process can be kept alive: " + last_end};
 }
 
