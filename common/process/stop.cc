@@ -65,6 +65,7 @@ void StopSource::acknowledge() {
 struct StopOnSignals::Saved {
   struct sigaction interrupt;
   struct sigaction terminate;
+  struct sigaction hangup;
 };
 
 StopOnSignals::StopOnSignals(StopSource* stop, Way way) : saved_(std::make_unique<Saved>()) {
@@ -75,6 +76,9 @@ StopOnSignals::StopOnSignals(StopSource* stop, Way way) : saved_(std::make_uniqu
   sigemptyset(&action.sa_mask);
   action.sa_handler = handle;  // without SA_RESTART, so that blocking calls return
   sigaction(SIGTERM, &action, &saved_->terminate);
+  sigaction(SIGHUP, &action, &saved_->hangup);
+  // nohup's.
+  if (saved_->hangup.sa_handler == SIG_IGN) sigaction(SIGHUP, &saved_->hangup, nullptr);
   if (way == kIgnoreInterrupt) action.sa_handler = SIG_IGN;
   sigaction(SIGINT, &action, &saved_->interrupt);
   // A parent may have blocked them until the handlers stood.
@@ -88,6 +92,7 @@ StopOnSignals::StopOnSignals(StopSource* stop, Way way) : saved_(std::make_uniqu
 StopOnSignals::~StopOnSignals() {
   sigaction(SIGINT, &saved_->interrupt, nullptr);
   sigaction(SIGTERM, &saved_->terminate, nullptr);
+  sigaction(SIGHUP, &saved_->hangup, nullptr);
   signal_target.store(nullptr);
 }
 

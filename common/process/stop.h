@@ -42,8 +42,9 @@ class StopSource {
   std::atomic<std::int64_t> terminated_ns_;  // the last SIGTERM that counted
 };
 
-// While it lives, SIGINT and SIGTERM go to `stop`; afterwards the old handlers are back.  At most
-// one at a time (signal handlers are the process's own).
+// While it lives, SIGINT, SIGTERM and, unless it was ignored before, SIGHUP go to `stop`;
+// afterwards the old handlers are back.  At most one at a time (signal handlers are the process's
+// own).
 class StopOnSignals {
  public:
   enum Way {

@@ -120,6 +120,7 @@ int run_arguments(const std::vector<std::string>& arguments) {
   Console console;
   StopSource stop;
   const StopOnSignals signals(&stop, StopOnSignals::kSecondEnds);
+  signal(SIGXFSZ, SIG_IGN);  // a file as long as `ulimit -f` allows is an error of its writer
   CliContext context{console, stop};
   try {
     parse_arguments(*program, arguments);
