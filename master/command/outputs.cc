@@ -134,6 +134,7 @@ void Outputs::reads(const Config& config) {
   reads(config.path);
   reads(config.robot_path);
   reads(config.problem.log);
+  for (const std::string& file : config.trial_files) reads(file);
 }
 
 void Outputs::reads_runs(const std::vector<std::string>& folders) {

@@ -11,6 +11,7 @@
 #include "master/report/report_html.h"
 #include "master/report/run/run_report.h"
 #include "master/run/run_page.h"
+#include "master/run/stored_run.h"
 
 namespace gapfarm {
 namespace {
@@ -26,7 +27,8 @@ struct Page {
   std::string html;
   std::filesystem::path from;  // what was read
   std::filesystem::path out;   // where it goes unless configured otherwise
-  Json importance = {};        // of a run's parameters
+  Config config = {};          // of a run
+  Json importance = {};        // of its parameters
   std::size_t evaluations = 0;
 };
 
@@ -64,6 +66,8 @@ Result<Page> page_of_run(const std::filesystem::path& run) {
     }
   }
   page.evaluations = report.sample.evaluated.size();
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(run));
+  if (auto config = stored_config(reader.info(), {})) page.config = *std::move(config);
   return page;
 }
 
@@ -84,6 +88,7 @@ Result<int> run_report(ReportCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const Page page, page_of(command.from));
   const std::string out = command.out.empty() ? page.out.string() : command.out;
   command.outputs.reads(page.from.string());
+  command.outputs.reads(page.config);
   // Its own page is what it is there to draw again.
   const bool own = std::filesystem::path(out).lexically_normal() == page.out.lexically_normal();
   RETURN_IF_ERROR(own ? command.outputs.plan_again(out) : command.outputs.plan(out));

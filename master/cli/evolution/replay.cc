@@ -13,6 +13,7 @@
 #include "master/evolve/evolve.h"
 #include "master/evolve/individual.h"
 #include "master/farm/planned_trials.h"
+#include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -167,6 +168,8 @@ Result<int> run_replay(ReplayOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(const Problem problem, stored_problem(reader));
   ASSIGN_OR_RETURN(const Found found, find(reader, options));
 
+  ASSIGN_OR_RETURN(const Config config, stored_config(info, {}));
+  options.outputs.reads(config);
   options.outputs.reads((std::filesystem::path(options.run) / "run.sqlite").string());
   RETURN_IF_ERROR(options.outputs.plan(options.paths));
   RETURN_IF_ERROR(options.outputs.plan(options.out));

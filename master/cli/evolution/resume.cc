@@ -22,29 +22,34 @@ struct ResumeCommand {
   EvolutionOptions options;
 };
 
-// A run goes on with the robot that it began with.  What a program declares may be as it was, and
+bool is_written_after(const std::string& path, const std::string& began) {
+  struct stat file;
+  return stat(path.c_str(), &file) == 0 && S_ISREG(file.st_mode) &&
+         utc_text(static_cast<double>(file.st_mtime), kStoredTime) > began;
+}
+
+// A run goes on with the files that it began with.  What a program declares may be as it was, and
 // what it computes another thing.
 void note_changes(const Config& config, const RunInfo& info, Console& console) {
-  const auto text = read_text_file(info.config_path);
-  if (!info.config_path.empty() && text && *text != info.config_text) {
-    console.note(info.config_path +
-                 " has changed since the run began, which goes on as it was but for the options "
-                 "of this command; `gapfarm evolve` takes the file as it is");
-  }
-  const auto robot = read_text_file(config.robot_path);
-  if (!config.robot_path.empty() && robot && *robot != config.problem.robot_file) {
-    console.note(config.robot_path +
-                 " has changed since the run began, which goes on with the robot as it was; "
-                 "`gapfarm evolve` takes the file as it is");
+  const auto note = [&](const std::string& path, const std::string& as_it_was) {
+    const auto text = read_text_file(path);
+    if (path.empty() || !text || *text == as_it_was) return;
+    console.note(path +
+                 " has changed since the run began, which goes on with it as it was; `gapfarm "
+                 "evolve` takes the file as it is");
+  };
+  note(config.path, info.config_text);
+  note(config.robot_path, config.problem.robot_file);
+  for (const std::string& file : config.trial_files) {
+    if (!is_written_after(file, info.created)) continue;
+    console.note(file +
+                 " was written after the run began, which goes on with the log that it read then");
   }
   if (!config.problem.external) return;
   const ExternalCommand& command = config.problem.external->command;
   for (const std::string& argument : command.argv) {
-    struct stat file;
     const std::string path = std::filesystem::path(command.folder) / argument;
-    if (stat(path.c_str(), &file) != 0 || !S_ISREG(file.st_mode)) continue;
-    const std::string written = utc_text(static_cast<double>(file.st_mtime), kStoredTime);
-    if (written <= info.created) continue;
+    if (!is_written_after(path, info.created)) continue;
     console.note(path +
                  " was written after the run began: unless it computes the same, scores of "
                  "before and of now cannot be compared; begin another run by `gapfarm evolve`");
