@@ -108,7 +108,7 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
       {{"simulate", demo, "--sessions", "2", "--trials", "5", "--out", out},
        "would simulate 10 trials in 2 sessions"},
       {{"influence", demo, "--command", "forward", "--out", out}, "would trace"},
-      {{"stability", demo, "--command", "forward", "--out", out}, "would search 7 parameters"},
+      {{"stability", demo, "--command", "forward", "--out", out}, "would search 3 parameters"},
       {{"plan", demo, "--out", out}, "would plan 120 trials"},
       {{"predict", "--mined", log, "--trials", log, "--out", out}, "would predict 120 trials"},
   };

@@ -165,9 +165,10 @@ SubcommandRun setup_crossfit(CLI::App& app) {
                  "Columns that make a condition: trials alike in them repeat one another");
   app.add_option("--sweep", options->plan.sweeps,
                  "Vary these parameters alone around what was tuned");
-  app.add_option(
-      "--evaluations", options->evaluations,
-      "Stop each fit after the generation in which so many are reached, in place of the config's");
+  app.add_option("--evaluations", options->evaluations,
+                 "Stop each fit after the generation in which so many are reached, in place of the "
+                 "config's")
+      ->check(CLI::PositiveNumber);
   app.add_option("--seed", options->seed, "In place of the config's");
   options->declare(app, LongOptions::Leaves::kNothing, false);
   app.footer(

@@ -112,7 +112,7 @@ std::optional<RealDistances> targets_to_real(const Task& task) {
 }
 
 Result<DriveReport> drive_all(const DriveCommand& command, const Task& task, const Problem& problem,
-                              Farm& farm, Console& console) {
+                              const TrialLog& log, Farm& farm) {
   const DriveSettings& settings = command.settings;
   DriveReport report{command.coverage, {}, task.real, task.targets, targets_to_real(task)};
   const auto add = [&](const std::string& name, Result<std::vector<DrivenRun>> runs, bool spread) {
@@ -140,10 +140,6 @@ Result<DriveReport> drive_all(const DriveCommand& command, const Task& task, con
               : drive(simulated_mover(farm, problem, settings), constant, command.runs),
           true));
   if (!command.mined.empty()) {
-    ASSIGN_OR_RETURN(
-        const auto log,
-        read_trial_files(command.mined, command_names(problem.commands), command.reading.read));
-    show_notes(log, console);
     ASSIGN_OR_RETURN(constant, constant_velocities(log, problem.commands));
     ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, problem.commands));
     const auto mover = mined_mover(mined, settings);
@@ -196,6 +192,12 @@ Result<int> run_drive(DriveCommand& command, CliContext& context) {
   const Problem problem = problem_of(model);
   command.settings.frame_x_m = model.frame_x_m;
   command.settings.frame_y_m = model.frame_y_m;
+  TrialLog mined;
+  if (!command.mined.empty()) {
+    ASSIGN_OR_RETURN(mined, read_trial_files(command.mined, command_names(problem.commands),
+                                             command.reading.read));
+    show_notes(mined, context.console);
+  }
   // The commands' nominal motions, then the runs; way-points are a turn and a way each.
   const std::uint64_t legs = task.targets.empty() ? 1 : 2 * task.targets.size();
   const std::uint64_t tasks = problem.commands.size() + legs * command.runs;
@@ -207,7 +209,7 @@ Result<int> run_drive(DriveCommand& command, CliContext& context) {
   }
   ASSIGN_OR_RETURN(const auto asked, command.begin("drive", {{"drive", 1, tasks}}, {}, context));
   context.work->stage(0);
-  ASSIGN_OR_RETURN(const auto report, drive_all(command, task, problem, *asked, context.console));
+  ASSIGN_OR_RETURN(const auto report, drive_all(command, task, problem, mined, *asked));
   RETURN_IF_ERROR(command.outputs.write_in(
       command.out,
       {{kBand, band_csv(report)},

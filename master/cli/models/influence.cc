@@ -39,6 +39,12 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
                    command.traced.open(command.config, &command.settings.trace));
   command.outputs.reads(config);
   RETURN_IF_ERROR(command.outputs.plan_in(command.out, {"influence.csv", "genes.toml"}));
+  if (const auto& horizon = command.settings.horizon_s;
+      horizon && *horizon < command.settings.trace.interval_s) {
+    return Error{
+        fmt::format("--horizon {} s is shorter than --interval, {} s, so no pose lies in it",
+                    *horizon, command.settings.trace.interval_s)};
+  }
   show_notes(config.problem.log, context.console);
   for (std::size_t i = 0; i < kPathDistances.size(); ++i) {
     if (command.distance == kPathDistances[i].name) command.settings.distance = i;

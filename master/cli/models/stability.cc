@@ -33,8 +33,17 @@ std::string tried_csv(const StabilityReport& report, const Problem& problem) {
 }
 
 Result<int> run_stability(StabilityCommand command, CliContext& context) {
-  ASSIGN_OR_RETURN(const Config config,
-                   command.traced.open(command.config, &command.settings.trace));
+  ASSIGN_OR_RETURN(Config config, command.traced.open(command.config, &command.settings.trace));
+  std::erase_if(config.problem.genes, [&](const Gene& gene) {
+    const std::string& key = config.problem.table()[gene.row].key;
+    const bool is_noise = key.find("noise") != std::string::npos;
+    if (is_noise) {
+      context.console.note(
+          "not searched: " + key +
+          ", noise by which the spread is measured, and least where there is none");
+    }
+    return is_noise;
+  });
   RETURN_IF_ERROR(check_evolvable(config));
   command.outputs.reads(config);
   RETURN_IF_ERROR(command.outputs.plan_in(command.out, {"model.toml", "stability.csv"}));
@@ -98,7 +107,8 @@ SubcommandRun setup_stability(CLI::App& app) {
   app.add_option("--repeats", command->settings.repeats, "Runs with tiny changes at each point")
       ->check(CLI::Range(2, 10000))
       ->capture_default_str();
-  app.add_option("--evaluations", command->settings.evaluations, "Points to try")
+  app.add_option("--evaluations", command->settings.evaluations,
+                 "Points to try; the last generation is completed")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->traced.declare(app, &command->settings.trace);
