@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import sqlite3
+import urllib.parse
 from typing import Any, Optional, Sequence
 
 import numpy as np
@@ -42,7 +43,8 @@ class Run:
     def _open(self) -> "contextlib.closing[sqlite3.Connection]":
         # A reader that keeps its transaction open would make the master wait.
         path = os.path.abspath(os.path.join(self.folder, "run.sqlite"))
-        return contextlib.closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=60))
+        uri = f"file:{urllib.parse.quote(path)}?mode=ro"
+        return contextlib.closing(sqlite3.connect(uri, uri=True, timeout=60))
 
     def _table(self, query: str, values: Sequence[Any] = ()) -> pd.DataFrame:
         with self._open() as db:
