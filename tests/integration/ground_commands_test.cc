@@ -226,13 +226,12 @@ TEST_F(GroundCommands, EvolveWarnsOfTimesInMilliseconds) {
 
 // Multipliers of one robot's file were merged into the controller of another.
 TEST_F(GroundCommands, ExportRefusesAControllerOfAnotherRobot) {
-  const auto exported = [&](const std::string& multiplier) {
+  const auto exported = [&](const std::string& multiplier, const std::string& radius = "0.05") {
     const std::string file =
         folder_.write("control.yaml",
                       "base_controller:\n  type: diff_drive_controller/DiffDriveController\n"
-                      "  wheel_separation: 0.3\n  wheel_radius: 0.05\n"
-                      "  wheel_separation_multiplier: " +
-                          multiplier + "\n");
+                      "  wheel_separation: 0.3\n  wheel_radius: " +
+                          radius + "\n  wheel_separation_multiplier: " + multiplier + "\n");
     return gapfarm_command(
         {"export", "ros", config("[runs]\nfolders = [\"monday\"]\n"), "--controllers", file});
   };
@@ -240,6 +239,7 @@ TEST_F(GroundCommands, ExportRefusesAControllerOfAnotherRobot) {
   const Finished refused = exported("1.1");
   EXPECT_EQ(refused.exit_code, 2) << refused.out;
   EXPECT_THAT(refused.err, AllOf(HasSubstr("control.yaml:5"), HasSubstr("expected 1 as")));
+  EXPECT_THAT(exported("1.0", "0.06").err, HasSubstr("wheel_radius is 0.06, expected 0.05"));
 }
 
 }  // namespace gapfarm::ground_commands_test

@@ -154,6 +154,11 @@ Status check_controller(const DriveFacts& file, const GroundRobot& robot,
   if (const auto& separation = robot.controller.wheel_separation_m) {
     values.push_back({"wheel_separation", *separation, 0, {}, false});
   }
+  for (const RobotWheel& wheel : robot.wheels) {
+    const auto& believed = robot.controller.wheel_radius_m;
+    if (!wheel.driven || !wheel.radius_m) continue;
+    values.push_back({"wheel_radius", believed ? *believed : *wheel.radius_m, 0, {}, false});
+  }
   for (const ReportedValue& row : values) {
     const StatedNumber* stated = file.number(row.name);
     if (stated == nullptr || std::abs(stated->value - row.had) <= kSame * std::abs(row.had)) {
