@@ -125,7 +125,8 @@ void describe_step(const WatchedRows& rows, const ScaledFleet& fleet, const RunV
   const std::vector<RobotFit> fits = fit_robots(fleet, variances);
   std::vector<std::vector<std::vector<StepScore>>> of_robots;
   for (std::size_t u = 0; u < fits.size(); ++u) {
-    of_robots.push_back(score_steps(fits[u], fleet.robots[u], fleet.directions, found.length));
+    // That there is a step was found among those with more runs on either side.
+    of_robots.push_back(score_steps(fits[u], fleet.robots[u], fleet.directions, found.length, 1));
   }
   const auto [moments, scores] = pool_scores(fleet, found.robots, of_robots);
   std::vector<std::vector<double>> weights;

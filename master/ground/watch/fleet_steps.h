@@ -53,11 +53,12 @@ struct StepScore {
   double precision = 0;  // of the change
   double statistic() const { return change * change * precision; }
 };
-// [direction][onset]; nothing (precision 0) where fewer than kFewestAlike runs lie on a side, or
-// between it and another of the robot's steps in this direction.
+// [direction][onset]; nothing (precision 0) where fewer than `fewest` runs lie on a side, or fewer
+// than kFewestAlike between it and another of the robot's steps in this direction.
 std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const RobotRuns& robot,
                                                 const std::vector<Eigen::VectorXd>& directions,
-                                                std::size_t length = 0);
+                                                std::size_t length = 0,
+                                                std::size_t fewest = kFewestAlike);
 
 // What robots share, and differ by, as runs of one robot do.
 struct Shared {

@@ -98,7 +98,7 @@ void estimate_variances(std::vector<RobotRuns>* robots, RunVariances* at, int ro
 
 std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const RobotRuns& robot,
                                                 const std::vector<VectorXd>& directions,
-                                                std::size_t length) {
+                                                std::size_t length, std::size_t fewest) {
   const std::size_t n = robot.values.size();
   std::vector<std::vector<StepScore>> scores(directions.size(), std::vector<StepScore>(n));
   const Index p = n == 0 ? 0 : fit.precisions[0].rows();
@@ -112,7 +112,7 @@ std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const Robot
   for (std::size_t i = n; i-- > 0;) {
     count(i, 1);
     if (length > 0 && i + length < n) count(i + length, -1);
-    if (n - i < kFewestAlike + length || i < kFewestAlike) continue;
+    if (n - i < fewest + length || i < fewest) continue;
     for (std::size_t k = 0; k < directions.size(); ++k) {
       const VectorXd& d = directions[k];
       if (lies_near_step(robot, d, i) || (length > 0 && lies_near_step(robot, d, i + length)))

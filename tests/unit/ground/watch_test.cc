@@ -110,6 +110,22 @@ TEST(Watch, NamesTheRobotTheWheelAndTheRun) {
   }
 }
 
+// A change that is met in the first or last runs was dated three runs from the end, with an
+// interval beside the truth.
+TEST(Watch, DatesAChangeCloseToTheEnds) {
+  const WatchedRows rows = rows_of_create();
+  for (const std::size_t onset : {2u, 12u}) {
+    Fleet fleet = make_fleet(rows, 11);
+    add(rows, "left", -0.04, onset, kRuns, &fleet[2]);
+    const FleetChanges changes = find_changes(rows, fleet, 1);
+    ASSERT_EQ(changes.steps.size(), 1u) << onset;
+    const ValueStep& step = changes.steps[0];
+    EXPECT_EQ(step.onset, onset);
+    EXPECT_LE(step.lo, -0.04);
+    EXPECT_GE(step.hi, -0.04);
+  }
+}
+
 // Each alone would be found; neither is scatter of the other's robot.
 TEST(Watch, NamesTheSameStepOfTwoRobots) {
   const WatchedRows rows = rows_of_create();
