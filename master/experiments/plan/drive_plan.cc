@@ -14,7 +14,9 @@ constexpr double kMemory_s = 5;     // for which a command before a move still s
 constexpr double kStands = 0.1;     // of a usual rate
 constexpr double kRest_s = 1;       // at the end
 constexpr double kPoseEvery_s = 0.1;
-constexpr double kMoves_s[] = {0.5, 1, 2, 4};
+// Off the grid of windows and of poses: commands that change where a window begins hardly show how
+// late they act.
+constexpr double kMoves_s[] = {0.53, 1.07, 2.13, 3.97};
 constexpr double kLevels[] = {-1, -0.5, 0, 0.5, 1};
 
 // The marker's steps between times, and how they change with the rows.  What slows down by its size
@@ -182,7 +184,11 @@ class Planner {
 
   Path path_of(const std::vector<Move>& moves) const {
     Path path;
-    path.run.start_s = std::max(0.0, t_s_ - kMemory_s);
+    path.run.start_s = t_s_ - kMemory_s;
+    if (path.run.start_s <= 0) {  // it stood before
+      path.run.start_s = -kMemory_s;
+      path.run.commands.push_back({-kMemory_s, still_});
+    }
     // The command that holds where the memory begins, and those after it.
     for (std::size_t i = 0; i < commands_.size(); ++i) {
       const bool over = i + 1 < commands_.size() && commands_[i + 1].t_s <= path.run.start_s;
@@ -218,12 +224,15 @@ class Planner {
     Pose X = X_WM_;
     double end = t_s_ + moves.front().seconds;
     for (std::size_t i = 0; i < path.at.size(); ++i) {
-      chosen.known.learn(path.at[i], slopes[i]);
-      X = X * path.at[i];
-      while (chosen.ends.size() < moves.size() && path.times_s[i + 1] >= end - 1e-9) {
-        chosen.ends.push_back(X);
+      const Pose& step = path.at[i];
+      const double from_s = path.times_s[i], to_s = path.times_s[i + 1];
+      chosen.known.learn(step, slopes[i]);
+      while (chosen.ends.size() < moves.size() && to_s >= end - 1e-9) {
+        const double share = std::min(1.0, (end - from_s) / (to_s - from_s));
+        chosen.ends.push_back(X * Pose{share * step.x, share * step.y, share * step.theta});
         if (chosen.ends.size() < moves.size()) end += moves[chosen.ends.size()].seconds;
       }
+      X = X * step;
     }
     chosen.ends.resize(moves.size(), X);
     return chosen;
