@@ -1,8 +1,13 @@
-// A gyro of another sign, unit or clock than the headings.
+// A gyro of another sign, unit or clock than the headings, and headings that drift.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "common/base/ranges.h"
+#include "common/math/statistics.h"
 #include "common/pose/pose.h"
 #include "common/recordings/windows.h"
 #include "master/io/log_checks/log_checks.h"
@@ -36,7 +41,73 @@ GyroFit fit_gyro(const RunLog& log, double late_s) {
   return gg > 0 && hh > 0 ? GyroFit{gh / hh, gh / std::sqrt(gg * hh)} : GyroFit{};
 }
 
+// While a robot stands: after its commands ended, and for so long.
+constexpr double kSettles_s = 0.5, kLeastStand_s = 0.5;
+constexpr std::size_t kFewestStands = 5, kFewestPoses = 5;
+constexpr double kLeastDrift_rad_s = 3e-3, kSureDrift = 4;  // standard errors
+
+// How fast the heading turns over some poses, rad/s, by least squares.
+double rate_of(std::span<const PoseRow> poses) {
+  double t0 = 0, turned = 0, tt = 0, th = 0;
+  std::vector<double> headings = {0};
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    turned += wrap_angle(poses[i].X_WM.theta - poses[i - 1].X_WM.theta);
+    headings.push_back(turned);
+  }
+  for (const PoseRow& pose : poses) t0 += pose.t_s / static_cast<double>(poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double t = poses[i].t_s - t0;
+    tt += t * t, th += t * headings[i];
+  }
+  return tt > 0 ? th / tt : 0;
+}
+
+// Of every stretch in which the robot stands.
+std::vector<double> standing_rates(const RunLog& log) {
+  std::vector<double> rates;
+  for (const LoggedRun& run : log.runs) {
+    if (run.commands.empty() || run.poses.empty()) continue;
+    for (std::size_t i = 0; i < run.commands.size(); ++i) {
+      const auto is_still = [](const CommandRow& row) {
+        return std::ranges::all_of(row.values, [](double v) { return v == 0; });
+      };
+      if (!is_still(run.commands[i])) continue;
+      const double from_s = run.commands[i].t_s + kSettles_s;
+      while (i + 1 < run.commands.size() && is_still(run.commands[i + 1])) ++i;
+      const double to_s =
+          i + 1 < run.commands.size() ? run.commands[i + 1].t_s : run.poses.back().t_s;
+      const auto first = std::ranges::lower_bound(run.poses, from_s, {}, &PoseRow::t_s);
+      const auto last = std::ranges::upper_bound(run.poses, to_s, {}, &PoseRow::t_s);
+      if (to_s - from_s < kLeastStand_s ||
+          last - first < static_cast<std::ptrdiff_t>(kFewestPoses)) {
+        continue;
+      }
+      rates.push_back(rate_of({first, last}));
+    }
+  }
+  return rates;
+}
+
 }  // namespace
+
+void check_standing(const RunLog& log, RunChecks* checks) {
+  if (log.relative) return;
+  const std::vector<double> rates = standing_rates(log);
+  if (rates.size() < kFewestStands) return;
+  const double rate = median(rates), n = static_cast<double>(rates.size());
+  // Of a median, by the median of what they differ from it by.
+  const double scatter = median(mapped(rates, [&](double r) { return std::abs(r - rate); }));
+  if (std::abs(rate) < std::max(kLeastDrift_rad_s, kSureDrift * 1.86 * scatter / std::sqrt(n))) {
+    return;
+  }
+  checks->findings.push_back(
+      {"headings_drift",
+       "While the robot is commanded to stand its heading turns by " + few_digits(rate) +
+           " rad/s, the median of " + std::to_string(rates.size()) + " stretches.",
+       "Look where headings come from: a gyro's bias, or a frame that turns. What is named beside "
+       "it may stand for that.",
+       Severity::kNote});
+}
 
 void check_gyro(const RunLog& log, RunChecks* checks) {
   double late_s = 0;

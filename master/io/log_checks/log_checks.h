@@ -138,6 +138,8 @@ struct RunChecks {
 };
 
 void check_gyro(const RunLog& log, RunChecks* checks);
+// Headings that turn while the robot is commanded to stand (`headings_drift`).
+void check_standing(const RunLog& log, RunChecks* checks);
 
 // Runs whose poses never change, or crawl, though the robot is commanded to drive, or whose
 // headings alone never do though it turns, that move though nothing is commanded, and that are

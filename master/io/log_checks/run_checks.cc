@@ -337,6 +337,7 @@ RunChecks check_runs(const RunLog& log, std::optional<double> timeout_s) {
   add_useless_runs(log, &checks);
   add_gaps(log, &checks);
   check_gyro(log, &checks);
+  check_standing(log, &checks);
   if (timeout_s) add_stale_commands(log, *timeout_s, &checks);
   return checks;
 }

@@ -54,6 +54,24 @@ TEST(RunChecks, ASoundLogPasses) {
   }
 }
 
+TEST(RunChecks, HeadingsThatTurnWhileTheRobotStandsAreReported) {
+  for (const double drift_rad_s : {0.0, 0.01}) {
+    RunLog log;
+    for (int r = 0; r < 3; ++r) {
+      RunLog two = two_runs({1.0 * r, 0, 0});
+      log.channels = two.channels;
+      for (LoggedRun& run : two.runs) {
+        run.run += std::to_string(r);
+        for (PoseRow& pose : run.poses) pose.X_WM.theta += drift_rad_s * pose.t_s;
+        log.runs.push_back(std::move(run));
+      }
+    }
+    const std::vector<std::string> found = names_of(check_runs(log, {}));
+    EXPECT_EQ(found, drift_rad_s > 0 ? std::vector<std::string>{"headings_drift"}
+                                     : std::vector<std::string>());
+  }
+}
+
 // As a quaternion in another order has them; of a robot that does not turn they are as they should.
 TEST(RunChecks, HeadingsThatNeverChangeAreOmitted) {
   for (const double w : {0.0, 0.8}) {
