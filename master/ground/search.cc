@@ -183,17 +183,23 @@ const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
 // What closes as much, alone, as a fault of the log has to.
 double closed_by_fault() { return 3 * std::log(kFaultShrinks); }
 
-// A hypothesis of values that every fit moves has nothing to gain by being free; beside a file that
-// stands as it is it may explain most, or all but what is tolerated.
+// A hypothesis of values that every fit moves has nothing to gain by being free; beside what is
+// named by now, the other values as the file has them, it may explain most, or all but what is
+// tolerated.
 std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, const GroundWork& work,
                                                 const GroundSearch& search) {
-  const WindowFit& file = search.chain.front();
+  const WindowFit& named = search.chain.back();
   const WindowFit moved = fit_held_out(fitter, search.fit.rows, search.fit.values);
   const auto gain = [&](const WindowFit& with, const WindowFit& without) {
     return held_out_gain(fitter.windows(), with, without, work.seed);
   };
-  if (gain(moved, file).lo < kToleratedGap) return std::nullopt;
-  const double as_it_stands = fitter.hold({}, {}).objective;
+  if (gain(moved, named).lo < kToleratedGap) return std::nullopt;
+  std::vector<FitRow> rows_named;
+  Eigen::VectorXd values_named;
+  for (const GroundStep& step : search.steps) {
+    rows_named = with_freed(std::move(rows_named), search.catalogue[step.chosen], &values_named);
+  }
+  const double as_it_stands = fitter.fit(rows_named, {}, values_named).objective;
   std::optional<Candidate> best;
   for (std::size_t i = 0; i < search.catalogue.size(); ++i) {
     const auto is_held = [&](const KinematicRow& row) {
@@ -201,12 +207,14 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     };
     const GroundHypothesis& hypothesis = search.catalogue[i];
     if (hypothesis.freed.empty() || !std::ranges::all_of(hypothesis.freed, is_held)) continue;
+    if (chosen_before(search, i)) continue;
     Candidate c{{i, 0, {}}};
-    Eigen::VectorXd values;
-    const WindowFit alone = fitter.fit(with_freed({}, hypothesis, &values), {}, values);
+    Eigen::VectorXd values = values_named;
+    const std::vector<FitRow> alone_rows = with_freed(rows_named, hypothesis, &values);
+    const WindowFit alone = fitter.fit(alone_rows, {}, values);
     c.held_out = fit_held_out(fitter, alone.rows, alone.values);
-    c.before = file;
-    c.held_out_gain = gain(c.held_out, file);
+    c.before = named;
+    c.held_out_gain = gain(c.held_out, named);
     c.offer.gain = alone.objective - as_it_stands;
     const bool all = gain(moved, c.held_out).hi < kToleratedGap;
     if (c.held_out_gain.lo < (all ? kToleratedGap : closed_by_fault())) continue;
@@ -272,7 +280,7 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     return c.competes && (!search->reference || c.gain() >= kShareOfBest * most);
   });
   const bool none = chosen == tried.end();
-  if (!further && !search->reference) {
+  if (!search->reference) {
     const auto within = best_within_tolerances(fitter, work, *search);
     if (within && (none || within->held_out_gain.lo > chosen->held_out_gain.hi)) {
       name_candidate(fitter.windows(), work, tried, *within, search);
