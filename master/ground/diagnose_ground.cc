@@ -169,6 +169,76 @@ Result<GroundDiagnosis> diagnose_by(const GroundRobot& robot, const RunLog& log,
   return diagnose_driven(robot, robot, log, options, {}, std::move(question));
 }
 
+namespace {
+
+// The robot as measured speeds drive it, with the log of these.
+struct Driven {
+  GroundRobot robot;
+  RunLog log;
+  double rows_late_s = 0;
+};
+
+Driven by_wheels(const GroundRobot& robot, const RunLog& log, const GroundWork& work) {
+  Driven driven{driven_by_wheels(robot, log), driven_by_wheels(log)};
+  driven.rows_late_s = wheel_rows_late_s(driven.robot, driven.log, work.windows);
+  for (LoggedRun& run : driven.log.runs) {
+    for (CommandRow& row : run.commands) row.t_s -= driven.rows_late_s;
+  }
+  return driven;
+}
+
+// Beside what was found behind the wheels what lies before them: how late and slowly they follow
+// commands, with the robot as it was corrected.
+Status add_motors(const RunLog& log, GroundDiagnoseOptions options, GroundDiagnosis* found) {
+  if (found->figures.faults > 0 || log.relative) return {};
+  GroundQuestion question = ask_what_is_wrong(found->corrected, log);
+  std::erase_if(question.catalogue, [&](const GroundHypothesis& h) {
+    static const std::vector<std::string> kMotors = {"command_delay", "motor_lag",
+                                                     "acceleration_limit", "motor_deadband"};
+    return h.put_right || !contains(kMotors, h.name) || contains(options.excluded, h.name);
+  });
+  options.excluded.clear();
+  ASSIGN_OR_RETURN(auto before, diagnose_by(found->corrected, log, options, std::move(question)));
+  Diagnosis& d = found->diagnosis;
+  if (before.diagnosis.effects.empty()) return {};
+  if (d.effects.empty() && d.verdict == Verdict::kNone) {
+    append(before.diagnosis.cautions, std::move(d.cautions));
+    *found = std::move(before);
+    return {};
+  }
+  d.headline += " Beside it: " + joined(before.diagnosis.effects, ", ", &NamedEffect::name) + ".";
+  d.cautions.push_back(
+      "What lies between commands and wheels was judged by the commands: its share is of the gap "
+      "that these leave.");
+  append(d.effects, std::move(before.diagnosis.effects));
+  append(found->figures.named, std::move(before.figures.named));
+  d.verdict = ground_verdict(found->figures);
+  found->corrected = std::move(before.corrected);
+  return {};
+}
+
+Result<GroundDiagnosis> diagnose_measured(const GroundRobot& robot, const RunLog& log,
+                                          const GroundDiagnoseOptions& options) {
+  GroundDiagnoseOptions of_slip = options;
+  const RunLog* reference = options.reference ? &*options.reference : nullptr;
+  const Driven driven = by_wheels(robot, log, options);
+  if (reference != nullptr) of_slip.reference = by_wheels(robot, *reference, options).log;
+  ASSIGN_OR_RETURN(auto found,
+                   diagnose_driven(robot, driven.robot, driven.log, of_slip,
+                                   measure_wheel_loop(robot, log, reference, options.seed),
+                                   ask_what_is_wrong(driven.robot, driven.log)));
+  if (driven.rows_late_s > 0) {
+    found.diagnosis.cautions.push_back(fmt::format(
+        "Rows of wheel speeds were taken to hold from {:.3g} s before their stamps on, which "
+        "explains the motions far better.",
+        driven.rows_late_s));
+  }
+  if (reference == nullptr) RETURN_IF_ERROR(add_motors(log, options, &found));
+  return found;
+}
+
+}  // namespace
+
 Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& logged,
                                         const GroundDiagnoseOptions& options) {
   const RunChecks checks = check_runs(logged, robot.motors.command_timeout_s);
@@ -184,14 +254,8 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
     const RunLog* reference = useful.reference ? &*useful.reference : nullptr;
     const bool measured = has_wheel_speeds(robot, log) &&
                           (reference == nullptr || has_wheel_speeds(robot, *reference));
-    if (!measured) return diagnose_by(robot, log, useful, ask_what_is_wrong(robot, log));
-    GroundDiagnoseOptions of_slip = useful;
-    if (reference != nullptr) of_slip.reference = driven_by_wheels(*reference);
-    const GroundRobot driven = driven_by_wheels(robot, log);
-    const RunLog wheels = driven_by_wheels(log);
-    return diagnose_driven(robot, driven, wheels, of_slip,
-                           measure_wheel_loop(robot, log, reference, useful.seed),
-                           ask_what_is_wrong(driven, wheels));
+    return measured ? diagnose_measured(robot, log, useful)
+                    : diagnose_by(robot, log, useful, ask_what_is_wrong(robot, log));
   });
   if (!result) return result;
   append(result->diagnosis.sanity, checks.findings);

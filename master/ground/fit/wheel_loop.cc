@@ -154,6 +154,32 @@ RunLog driven_by_wheels(RunLog log) {
   return log;
 }
 
+double wheel_rows_late_s(const GroundRobot& driven, const RunLog& wheels,
+                         const WindowSettings& windows) {
+  const auto set = window_set(driven, wheels, windows);
+  if (!set) return 0;
+  std::vector<double> apart;
+  for (const LoggedRun& run : wheels.runs) {
+    for (std::size_t i = 1; i < run.commands.size(); ++i) {
+      apart.push_back(run.commands[i].t_s - run.commands[i - 1].t_s);
+    }
+  }
+  const double row_s = median(std::move(apart));
+  const std::optional<GroundReference> none;
+  const WindowFitter fitter(driven, *set, none);
+  const std::vector<FitRow> rows = held_rows(kinematic_rows(driven));
+  Eigen::VectorXd values = nominals(rows);
+  double best = fitter.hold(rows, values).objective + kFaultGain, late_s = 0;
+  for (const double late : {0.5, 1.0}) {
+    values[row_index(rows, "delay")] = -late * row_s;
+    const double objective = fitter.hold(rows, values).objective;
+    if (objective <= best) continue;
+    best = objective;
+    late_s = late * row_s;
+  }
+  return late_s;
+}
+
 WheelLoop measure_wheel_loop(const GroundRobot& robot, const RunLog& log, const RunLog* reference,
                              std::uint64_t seed) {
   const LoopWindows here = loop_windows(robot, log);
@@ -201,7 +227,7 @@ void report_wheel_loop(const WheelLoop& loop, bool against_reference, Diagnosis*
                 " of their set speed";
   if (loop.gain < kLeastChangeGain) {
     diagnosis->cautions.push_back(
-        "From command to wheel nothing is off by more than a loop is by itself: " + speeds + ".");
+        "From command to wheel no more speed is lost than a loop loses by itself: " + speeds + ".");
     return;
   }
   static const std::set<std::string> kFloors = {"floor", "wheel_slip", "friction_across"};

@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "common/recordings/run.h"
+#include "common/recordings/windows.h"
 #include "common/robot/robot.h"
 #include "master/diagnose/result/diagnosis.h"
 
@@ -28,6 +29,11 @@ bool has_wheel_speeds(const GroundRobot& robot, const RunLog& log);
 // The robot and the log with measured wheel speeds as commands.  REQUIRES: has_wheel_speeds().
 GroundRobot driven_by_wheels(GroundRobot robot, const RunLog& log);
 RunLog driven_by_wheels(RunLog log);
+
+// How long before its stamp a row of measured speeds begins to hold: 0, half a row (a reading of
+// that moment) or a row (the mean since the one before), whichever explains the motions best.
+double wheel_rows_late_s(const GroundRobot& driven, const RunLog& wheels,
+                         const WindowSettings& windows);
 
 // `reference` may be null.  REQUIRES: has_wheel_speeds() of both.
 WheelLoop measure_wheel_loop(const GroundRobot& robot, const RunLog& log, const RunLog* reference,
