@@ -17,9 +17,10 @@ namespace {
 
 constexpr int kOwnRounds = 10;  // of Gauss and Newton, for a run alone
 constexpr std::size_t kMostRuns = 9;
-constexpr int kClockSteps = 15;        // either way
-constexpr double kClockStep_s = 0.02;  // either way of the common delay
-constexpr double kNeverSo = -1e300;    // nats
+// Of a run's clock, either way of the common delay.
+constexpr double kClockStep_s = 0.02, kFarClockStep_s = 0.05;
+constexpr int kClockSteps = 15, kFarClockSteps = 24;
+constexpr double kNeverSo = -1e300;  // nats
 constexpr std::size_t kFewestApart = 10;
 constexpr double kNoisy = 2;
 
@@ -55,6 +56,16 @@ double objective_with_own_clock(const WindowFitter& fitter, std::vector<FitRow> 
   if (delay < 0 || fitter.windows().simulated) return kNeverSo;
   rows[delay].free = true;
   return fitter.fit(rows, {}, scan_delay(fitter, rows, values)).objective;
+}
+
+// Ascending: close to the common one in small steps.
+std::vector<double> clocks_about(double common_s) {
+  std::vector<double> all;
+  const double near_s = kClockStep_s * kClockSteps;
+  for (int k = -kFarClockSteps; k < 0; ++k) all.push_back(common_s - near_s + kFarClockStep_s * k);
+  for (int k = -kClockSteps; k <= kClockSteps; ++k) all.push_back(common_s + kClockStep_s * k);
+  for (int k = 1; k <= kFarClockSteps; ++k) all.push_back(common_s + near_s + kFarClockStep_s * k);
+  return all;
 }
 
 // How much closer a run is to what its own values expect than to those of all runs: the ratio of
@@ -104,33 +115,6 @@ std::vector<std::size_t> moving(const std::vector<WindowSpeeds>& speeds, const W
   const double turning = quantile(mapped(of_length, turn), 0.9);
   return filtered(of_length,
                   [&](std::size_t i) { return 2 * ahead(i) >= fast || 2 * turn(i) >= turning; });
-}
-
-// Where many windows miss by far more than half of them do; empty: nowhere.
-std::string far_windows(const WindowFitter& fitter, const GroundSearch& search,
-                        const std::vector<double>& missed) {
-  const WindowSet& windows = search.windows;
-  const std::vector<WindowSpeeds> speeds = window_speeds(fitter, search.fit);
-  double most = kFarShare;
-  std::string text;
-  for (int length = 0; length < windows.lengths; ++length) {
-    const std::vector<std::size_t> moves = moving(speeds, windows, length);
-    if (moves.size() < kFewestReadings) continue;
-    const double middle = median(mapped(moves, [&](std::size_t i) { return missed[i]; }));
-    const auto far = filtered(moves, [&](std::size_t i) { return missed[i] > kFarRun * middle; });
-    const double share = static_cast<double>(far.size()) / static_cast<double>(moves.size());
-    if (share < most) continue;
-    most = share;
-    const std::string& run = search.log.runs[windows.run_of[far[0]]].run;
-    text = fmt::format(
-        "Of the windows of {} in which the robot is to move {:.0f} % miss by more than {:g} times "
-        "what half of them do, the first at {:.1f} s of run {}: something comes and goes. Look at "
-        "the commands and the poses there: commands that did not arrive, wheels that slipped, a "
-        "robot that was held, poses that are not its own.",
-        windows.length_text(length), 100 * share, kFarRun, windows.trials[far[0]].t_s.value_or(0),
-        run);
-  }
-  return text;
 }
 
 }  // namespace
@@ -225,6 +209,32 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
   return {};
 }
 
+std::string far_windows(const WindowFitter& fitter, const GroundSearch& search, double least) {
+  const WindowSet& windows = search.windows;
+  const std::vector<double> missed = misses(search.fit, windows);
+  const std::vector<WindowSpeeds> speeds = window_speeds(fitter, search.fit);
+  double most = least;
+  std::string text;
+  for (int length = 0; length < windows.lengths; ++length) {
+    const std::vector<std::size_t> moves = moving(speeds, windows, length);
+    if (moves.size() < kFewestReadings) continue;
+    const double middle = median(mapped(moves, [&](std::size_t i) { return missed[i]; }));
+    const auto far = filtered(moves, [&](std::size_t i) { return missed[i] > kFarRun * middle; });
+    const double share = static_cast<double>(far.size()) / static_cast<double>(moves.size());
+    if (share < most) continue;
+    most = share;
+    const std::string& run = search.log.runs[windows.run_of[far[0]]].run;
+    text = fmt::format(
+        "Of the windows of {} in which the robot is to move {:.0f} % miss by more than {:g} times "
+        "what half of them do, the first at {:.1f} s of run {}: something comes and goes. Look at "
+        "the commands and the poses there: commands that did not arrive, wheels that slipped, a "
+        "robot that was held, poses that are not its own.",
+        windows.length_text(length), 100 * share, kFarRun, windows.trials[far[0]].t_s.value_or(0),
+        run);
+  }
+  return text;
+}
+
 std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
   const WindowSet& windows = search.windows;
   const std::vector<double> missed = misses(search.fit, windows);
@@ -247,7 +257,7 @@ std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
                               search.log.runs[r].run, times,
                               has_own ? ", and other values fit it" : ""));
   }
-  if (far.empty()) return far_windows(fitter, search, missed);
+  if (far.empty()) return "";
   return joined(far, " ") +
          (all_own ? " Something was other in these: floor, load, mark, clock or the robot itself."
                   : " Look at the commands and the poses of these: another run's, the other way "
@@ -334,30 +344,29 @@ std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search)
   const std::size_t runs = windows.run_blocks.size();
   const Eigen::Index delay = row_index(fit.rows, "delay");
   if (runs < 2 || runs > kMostRuns || delay < 0) return {};
-  Eigen::MatrixXd nats = Eigen::MatrixXd::Zero(runs, 2 * kClockSteps + 1);
-  const auto delay_at = [&](Eigen::Index step) {
-    return fit.values[delay] + kClockStep_s * static_cast<double>(step - kClockSteps);
-  };
-  for (Eigen::Index step = 0; step < nats.cols(); ++step) {
+  const std::vector<double> delays = clocks_about(fit.values[delay]);
+  Eigen::MatrixXd nats = Eigen::MatrixXd::Zero(runs, delays.size());
+  for (std::size_t k = 0; k < delays.size(); ++k) {
     Eigen::VectorXd values = fit.values;
-    values[delay] = delay_at(step);
+    values[delay] = delays[k];
     const WindowFit held = fitter.hold(fit.rows, values);
     for (std::size_t i = 0; i < held.nats.size(); ++i) {
-      nats(windows.run_of[i], step) += held.nats[i] / windows.lengths;
+      nats(windows.run_of[i], k) += held.nats[i] / windows.lengths;
     }
   }
-  const double common = nats.colwise().sum().maxCoeff();
   std::vector<std::string> clocks;
+  Eigen::RowVectorXd common = Eigen::RowVectorXd::Zero(nats.cols());
   double own = 0;
   for (std::size_t r = 0; r < runs; ++r) {
-    if (!contains(windows.run_of, r)) continue;
     Eigen::Index best = 0;
-    own += nats.row(r).maxCoeff(&best);
-    if (best == 0 || best + 1 == nats.cols()) return {};  // no clock within reach
-    clocks.push_back(fmt::format("{:+.2f} s in run {}", delay_at(best), search.log.runs[r].run));
+    const double most = nats.row(r).maxCoeff(&best);
+    if (best == 0 || best + 1 == nats.cols()) continue;  // no clock within reach
+    own += most;
+    common += nats.row(r);
+    clocks.push_back(fmt::format("{:+.2f} s in run {}", delays[best], search.log.runs[r].run));
   }
   const double least = kLeastChangeGain * (static_cast<double>(clocks.size()) - 1);
-  return clocks.size() < 2 || own - common < least ? "" : joined(clocks);
+  return clocks.size() < 2 || own - common.maxCoeff() < least ? "" : joined(clocks);
 }
 
 }  // namespace gapfarm

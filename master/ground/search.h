@@ -165,10 +165,12 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
 
 // Of three runs or more those whose windows miss by far more than the others' (kFarRun), medians
 // of each, and those that values of their own fit as much better as a fault is worth: commands of
-// another run, a world that is mirrored in this one alone, a wheel that slips.  Of windows many
-// (kFarShare) that do: what comes and goes, as commands that did not arrive.  "Run 3 misses by
+// another run, a world that is mirrored in this one alone, a wheel that slips.  "Run 3 misses by
 // 12.0 times as much as the others.", one sentence a run, and what to look at; empty: none.
 std::string far_runs(const WindowFitter& fitter, const GroundSearch& search);
+// Where at least such a share of the windows of a length miss by far more than half of them do:
+// what comes and goes, as commands that did not arrive; a sentence; empty: nowhere.
+std::string far_windows(const WindowFitter& fitter, const GroundSearch& search, double least);
 // A part of the floor that explains more than the best of many places does by chance, of runs that
 // were fitted, and has no name: a sentence; empty: none.
 std::string unconfirmed_part(const GroundSearch& search);

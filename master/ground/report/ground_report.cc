@@ -14,7 +14,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kAlmostSure = 0.99;  // no log makes surer than this
+constexpr double kAlmostSure = 0.99;   // no log makes surer than this
+constexpr double kRareWindows = 0.03;  // so many that are off by themselves are worth a look
 
 void add_alias(const std::string& name, NamedEffect* effect) {
   if (name == effect->name || effect->aliases.size() >= kMostAliases) return;
@@ -124,7 +125,6 @@ class GroundReport {
               h.thing, source_of(robot_), std::exp(gap / 3)),
           h.remedy);
       effect.gap_before = gap / search_.windows.counts;
-      effect.text += " " + h.remedy;
       d_.effects.push_back(std::move(effect));
     }
   }
@@ -215,10 +215,16 @@ class GroundReport {
     figures_.closable = search_.closable;
     figures_.best_of_all = search_.best_of_all;
     figures_.far_runs = far_runs(fitter_, search_);
+    has_far_runs_ = !figures_.far_runs.empty();
+    if (!has_far_runs_) figures_.far_runs = far_windows(fitter_, search_, kFarShare);
     figures_.unexplained = search_.unexplained;
     figures_.stood = hardly_moved(search_.log);
     if (nothing_is_left(figures_)) figures_.far_runs = unconfirmed_part(search_);
     d_.verdict = ground_verdict(figures_);
+    if (figures_.far_runs.empty()) {
+      const std::string rare = far_windows(fitter_, search_, kRareWindows);
+      if (!rare.empty()) d_.cautions.push_back(rare);
+    }
     d_.findings.push_back(verdict_reason(figures_));
     if (!search_.stand_ins.empty()) d_.findings.push_back(nearest_of_catalogue(search_));
     unseen_ = values_not_shown(search_, unseen_rows_);
@@ -233,6 +239,10 @@ class GroundReport {
       return;
     }
     d_.where = where_left(fitter_, search_);
+    if (d_.where.empty() && !figures_.far_runs.empty()) {
+      d_.where.push_back(
+          {"all", "x", "outliers", "", d_.position_mm.final_, 1, 1, figures_.far_runs});
+    }
     if (!moved.empty()) {
       d_.findings.push_back("Were all values free, these would move most: " + moved + ".");
     }
@@ -240,7 +250,7 @@ class GroundReport {
 
   void clocks() {
     // A run that is off by itself looks as if its clock were.
-    const std::string runs = figures_.far_runs.empty() ? clocks_apart(fitter_, search_) : "";
+    const std::string runs = has_far_runs_ ? "" : clocks_apart(fitter_, search_);
     if (runs.empty()) return;
     d_.cautions.push_back(
         "The runs' clocks are apart: from command to pose it takes " + runs +
@@ -373,6 +383,7 @@ class GroundReport {
   Eigen::MatrixX2d intervals_;
   std::vector<std::string> unseen_rows_;
   std::string unseen_;  // which values no window shows; empty: none
+  bool has_far_runs_ = false;
   GroundDiagnosis result_;
   Diagnosis& d_ = result_.diagnosis;
   GroundFigures& figures_ = result_.figures;

@@ -312,9 +312,8 @@ std::string further_values(const GroundSearch& search, const std::vector<Reporte
   std::vector<std::string> sure;
   for (std::size_t j = 0; j < values.size(); ++j) {
     const ReportedValue& v = values[j];
-    const bool sensed =
-        contains(search.sensor, v.name, [](const SensorValue& of) { return of.row.name; });
-    if (!v.named || search.fit.rows[j].free || sensed) continue;
+    if (!v.named || search.fit.rows[j].free) continue;
+    if (contains(search.sensor, v.name, [](const SensorValue& s) { return s.row.name; })) continue;
     sure.push_back(
         fmt::format("{} {} in place of {:.4g}", v.name,
                     with_interval("%.4g", v.reported, v.interval.lower, v.interval.upper), v.had));
@@ -341,7 +340,8 @@ std::vector<std::string> cautions_of(const GroundRobot& robot, const GroundSearc
 
 std::string what_to_do(const GroundSearch& search, const GroundFigures& figures,
                        const Diagnosis& diagnosis) {
-  if (!search.faults.empty()) return search.catalogue[search.faults[0].hypothesis].remedy;
+  const auto remedy = [&](const FoundFault& f) { return search.catalogue[f.hypothesis].remedy; };
+  if (!search.faults.empty()) return joined(search.faults, " ", remedy);
   if (diagnosis.effects.empty()) {
     if (search.unexplained >= kUnexplained) return "Put the log right: no value is fitted to it.";
     if (diagnosis.verdict == Verdict::kNone) {

@@ -23,6 +23,7 @@ namespace {
 
 constexpr double kBeginAt = 10;      // times the values' covariance, where they may vary
 constexpr double kFarthest = 4;      // standard deviations that no draw lies beyond
+constexpr double kHeldError = 1e-6;  // less than any log shows
 constexpr int kMostAttempts = 1000;  // at a draw within the bounds; then it is moved onto them
 
 // Sizes in m in place of ratios to them, of a robot with two sides.
@@ -271,7 +272,9 @@ std::string ranges_table(const Ranges& ranges) {
          ranges.robot ? number(v.error, 2) : "-", ranges.robot ? number(v.varies, 2) : "-",
          fmt::format("[{:.4g}, {:.4g}]", v.interval.lower, v.interval.upper),
          place(mujoco) + " / " + place(sdf) +
-             (v.shown ? "" : "; this log does not show it: as wide as is plausible")});
+             (v.shown                ? ""
+              : v.error < kHeldError ? "; held: this log cannot show it"
+                                     : "; this log does not show it: as wide as is plausible")});
   }
   std::string text = table.text("<<>>>><");
   for (const WindowScatter& s : ranges.scatter) {

@@ -11,6 +11,7 @@
 
 #include "common/problem/problem.h"
 #include "common/robot/robot.h"
+#include "common/robot/robot_drive.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/tolerances.h"
 #include "tests/unit/ground/driven_log.h"
@@ -193,6 +194,76 @@ TEST(WrongFile, AllOfFourWrongValuesAreNamed) {
   for (const NamedEffect& e : found.diagnosis.effects) {
     for (const std::string& alias : e.aliases) EXPECT_FALSE(names(found, alias)) << e.name;
   }
+}
+
+// The second was moved within its tolerances by every fit, and had no name: "no value need be off
+// by much, but many by a little".
+TEST(WrongFile, AValueOfAFewTolerancesIsNamedBesideAnother) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const GroundDiagnosis found =
+      checked(robot, driven(robot, off_by({"delay", "lag"}, {0.06, 0.03})), "delay and lag");
+  EXPECT_TRUE(names(found, "command_delay")) << found.diagnosis.headline;
+  EXPECT_TRUE(names(found, "motor_lag")) << found.diagnosis.headline;
+  EXPECT_EQ(found.diagnosis.verdict, Verdict::kEffect);
+}
+
+// Speeds of wheels beside the commands, a row each 50 ms, each the mean of what follows its stamp
+// or, `late_s` later, of what came before.
+RunLog with_wheel_rows(RunLog log, const GroundRobot& truly, double late_s) {
+  constexpr double kRow_s = 0.05;
+  log.wheel_channels = {"left", "right"};
+  for (LoggedRun& run : log.runs) {
+    RobotDrive drive(truly, run.commands);
+    const double began = run.commands.front().t_s;
+    for (int k = 0; k < 240; ++k) {
+      const double t = began + kRow_s * k;
+      CommandRow row{t + late_s, {}};
+      for (const WheelMotion& wheel : drive.advance(t, kRow_s, 0)) {
+        row.values.push_back(wheel.speed_m_s / *truly.wheels[row.values.size()].radius_m);
+      }
+      run.wheel_speeds.push_back(row);
+    }
+  }
+  return log;
+}
+
+// A row stamped at its end passed for poses that are early, and a delay before the wheels for none.
+TEST(WrongFile, WheelRowsOfAnyStampShowWhatLiesBeforeTheWheels) {
+  const GroundRobot robot = robot_of(kDifferential);
+  for (const double late_s : {0.0, 0.05}) {
+    for (const double delay_s : {0.0, 0.08}) {
+      GroundRobot truly = robot;
+      truly.motors.delay_s = delay_s;
+      const RunLog log =
+          with_wheel_rows(driven(robot, off_by({"delay"}, {delay_s})), truly, late_s);
+      const GroundDiagnosis found = checked(robot, log, std::to_string(late_s));
+      const auto& cautions = found.diagnosis.cautions;
+      EXPECT_EQ(std::ranges::any_of(cautions,
+                                    [](const std::string& text) {
+                                      return text.find("0.05 s before their stamps") != text.npos;
+                                    }),
+                late_s > 0);
+      ASSERT_EQ(found.diagnosis.effects.size(), delay_s > 0 ? 1u : 0u) << found.diagnosis.headline;
+      if (delay_s == 0) continue;
+      EXPECT_EQ(found.diagnosis.effects[0].name, "command_delay");
+      EXPECT_NEAR(found.diagnosis.effects[0].parameters[0].value, delay_s, 0.01);
+      EXPECT_NEAR(found.corrected.motors.delay_s, delay_s, 0.01);
+    }
+  }
+}
+
+// Between what a caution of clocks reached and ten times the others' misses nothing was reported.
+TEST(WrongFile, ARunThatIsHalfASecondLateIsNotNothing) {
+  const GroundRobot robot = robot_of(kDifferential);
+  RunLog log = driven(robot, off_by({"delay"}, {0}));
+  for (PoseRow& pose : log.runs[2].poses) pose.t_s += 0.5;
+  const GroundDiagnosis found = checked(robot, log, "half a second");
+  EXPECT_NE(found.diagnosis.verdict, Verdict::kNone);
+  const bool named = std::ranges::any_of(found.diagnosis.cautions, [](const std::string& text) {
+    return text.find("+0.50 s in run 3") != text.npos;
+  });
+  EXPECT_TRUE(named || found.diagnosis.headline.find("Run 3") != std::string::npos)
+      << found.diagnosis.headline;
 }
 
 }  // namespace
