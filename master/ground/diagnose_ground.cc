@@ -233,7 +233,13 @@ Result<GroundDiagnosis> diagnose_measured(const GroundRobot& robot, const RunLog
         "explains the motions far better.",
         driven.rows_late_s));
   }
-  if (reference == nullptr) RETURN_IF_ERROR(add_motors(log, options, &found));
+  if (reference != nullptr) return found;
+  const Status added = add_motors(log, options, &found);
+  if (!added && options.stopped && options.stopped()) return added.error();
+  if (!added) {
+    found.diagnosis.cautions.push_back(
+        "What lies between commands and wheels could not be asked: " + added.error().message + ".");
+  }
   return found;
 }
 
