@@ -45,6 +45,7 @@ GyroFit fit_gyro(const RunLog& log, double late_s) {
 constexpr double kSettles_s = 0.5, kLeastStand_s = 0.5;
 constexpr std::size_t kFewestStands = 5, kFewestPoses = 5;
 constexpr double kLeastDrift_rad_s = 3e-3, kSureDrift = 4;  // standard errors
+constexpr double kSameWay = 0.9;                            // of the stretches turn
 
 // How fast the heading turns over some poses, rad/s, by least squares.
 double rate_of(std::span<const PoseRow> poses) {
@@ -97,7 +98,9 @@ void check_standing(const RunLog& log, RunChecks* checks) {
   const double rate = median(rates), n = static_cast<double>(rates.size());
   // Of a median, by the median of what they differ from it by.
   const double scatter = median(mapped(rates, [&](double r) { return std::abs(r - rate); }));
-  if (std::abs(rate) < std::max(kLeastDrift_rad_s, kSureDrift * 1.86 * scatter / std::sqrt(n))) {
+  const auto same = std::ranges::count_if(rates, [&](double r) { return r * rate > 0; });
+  if (std::abs(rate) < std::max(kLeastDrift_rad_s, kSureDrift * 1.86 * scatter / std::sqrt(n)) ||
+      static_cast<double>(same) < kSameWay * n) {
     return;
   }
   checks->findings.push_back(
