@@ -190,7 +190,13 @@ Driven by_wheels(const GroundRobot& robot, const RunLog& log, const GroundWork& 
 // Beside what was found behind the wheels what lies before them: how late and slowly they follow
 // commands, with the robot as it was corrected.
 Status add_motors(const RunLog& log, GroundDiagnoseOptions options, GroundDiagnosis* found) {
-  if (found->figures.faults > 0 || log.relative) return {};
+  if (log.relative) return {};
+  if (found->figures.faults > 0) {
+    found->diagnosis.cautions.push_back(
+        "How late and slowly the wheels follow commands was not asked: put right what is named "
+        "first, and diagnose again.");
+    return {};
+  }
   GroundQuestion question = ask_what_is_wrong(found->corrected, log);
   std::erase_if(question.catalogue, [&](const GroundHypothesis& h) {
     static const std::vector<std::string> kMotors = {"command_delay", "motor_lag",
@@ -200,13 +206,18 @@ Status add_motors(const RunLog& log, GroundDiagnoseOptions options, GroundDiagno
   options.excluded.clear();
   ASSIGN_OR_RETURN(auto before, diagnose_by(found->corrected, log, options, std::move(question)));
   Diagnosis& d = found->diagnosis;
-  if (before.diagnosis.effects.empty()) return {};
-  if (d.effects.empty() && d.verdict == Verdict::kNone) {
+  // Behind the wheels there is nothing; what is left, named or not, lies before them.
+  if (d.verdict == Verdict::kNone && before.diagnosis.verdict != Verdict::kNone) {
     append(before.diagnosis.cautions, std::move(d.cautions));
     *found = std::move(before);
     return {};
   }
-  d.headline += " Beside it: " + joined(before.diagnosis.effects, ", ", &NamedEffect::name) + ".";
+  if (before.diagnosis.effects.empty()) return {};
+  const bool first = d.effects.empty();
+  d.headline = first ? before.diagnosis.headline
+                     : d.headline + " Beside it: " +
+                           joined(before.diagnosis.effects, ", ", &NamedEffect::name) + ".";
+  if (first) d.action = before.diagnosis.action;
   d.cautions.push_back(
       "What lies between commands and wheels was judged by the commands: its share is of the gap "
       "that these leave.");
