@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <span>
 #include <sstream>
 
 #include "common/problem/problem.h"
@@ -218,8 +219,10 @@ RunLog with_wheel_rows(RunLog log, const GroundRobot& truly, double late_s) {
     for (int k = 0; k < 240; ++k) {
       const double t = began + kRow_s * k;
       CommandRow row{t + late_s, {}};
-      for (const WheelMotion& wheel : drive.advance(t, kRow_s, 0)) {
-        row.values.push_back(wheel.speed_m_s / *truly.wheels[row.values.size()].radius_m);
+      const std::span<const WheelMotion> motions = drive.advance(t, kRow_s, 0);
+      for (std::size_t w = 0; w < motions.size(); ++w) {
+        if (!truly.wheels[w].driven) continue;
+        row.values.push_back(motions[w].speed_m_s / *truly.wheels[w].radius_m);
       }
       run.wheel_speeds.push_back(row);
     }
