@@ -24,6 +24,8 @@ struct KinematicRow {
   std::string unit;       // of the difference from nominal
   bool positive = false;  // below 0 it has no meaning
   double farthest = 0;    // how far off nominal it may be where it is asked for; 0: anywhere
+  double step = 0.05;     // to find slopes, in tolerances
+  bool tuned = false;     // to the log, whatever is named
 };
 
 // Below it the value has no meaning; -infinity: anywhere.

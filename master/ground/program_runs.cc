@@ -24,7 +24,10 @@ constexpr std::size_t kKept = 32;              // motions at values of commands
 constexpr double kFar_m = 1e6;                 // where a program that diverges is held to be
 constexpr double kReach_m = 0.3;               // of a robot whose size nobody knows
 constexpr double kChannelOffsetShare = 0.005;  // of a channel's root mean square
-constexpr double kUntuned = 0.05;  // m: a unit above it, a foot say, is what no tuning is
+constexpr double kProgramStep = 4;      // of slopes, in tolerances: some print whole millimetres
+constexpr double kDelayStep_s = 0.04;   // a multiple of most programs' own
+constexpr double kJustBefore_s = 1e-6;  // so that no rounding makes one more of it
+constexpr double kUntuned = 0.05;       // m: a unit above it, a foot say, is what no tuning is
 constexpr const char* kMarkerRows[] = {"marker.x", "marker.y", "marker.yaw"};
 // Of the kinematics' rows, those that say how a program is asked and read.
 constexpr const char* kAround[] = {"delay",      "marker_x",   "marker_y",
@@ -75,32 +78,61 @@ class ProgramFarm {
         infer::remembering([this](const auto& points) { return predictor.attempt(points); }, kKept);
   };
 
-  // Of its robot's own origin.
-  Overrides asked_values(const Kinematics& at) const {
+  // Of its robot's own origin; `delay_s`: in place of the point's.
+  PredictionRequest request(const Kinematics& at, double delay_s) const {
     Overrides values;
     for (const char* row : kMarkerRows) values[problem_.table().row(row)] = 0;
     for (std::size_t k = 0; k < at.names.size(); ++k) {
       const auto row = problem_.table().find(at.names[k]);
       if (!row) continue;
       const Parameter& p = problem_.table()[*row];
-      values[*row] = std::clamp(at.values[k], p.lower, p.upper);
+      const double value = at.names[k] == "delay" ? delay_s : at.values[k];
+      values[*row] = std::clamp(value, p.lower, p.upper);
     }
-    return values;
+    return {values, {}};
+  }
+
+  // What the program says of each, nothing where it failed.  A delay between whole kDelayStep_s is
+  // interpolated: a program that takes commands at steps of its own jumps by one.
+  std::vector<std::optional<std::vector<Pose>>> answers(const std::vector<Kinematics>& points,
+                                                        Asked& asked) {
+    std::vector<PredictionRequest> requests;
+    std::vector<double> shares;
+    for (const Kinematics& at : points) {
+      const double steps = at.value_or("delay", 0) / kDelayStep_s;
+      const double less_s = kDelayStep_s * std::floor(steps) - kJustBefore_s;
+      shares.push_back(steps - std::floor(steps));
+      requests.push_back(request(at, less_s));
+      if (shares.back() > 0) requests.push_back(request(at, less_s + kDelayStep_s));
+    }
+    auto found = asked.forward(requests);
+    if (!found) failure_ = found.error();
+    if (const auto& why = asked.predictor.broken()) {
+      failure_ = Error{"the program: " + *why, ErrorCode::kSimulation};
+    }
+    std::vector<std::optional<std::vector<Pose>>> read(points.size());
+    if (!found) return read;
+    auto next = found->begin();
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      read[k] = std::move(*next++);
+      if (shares[k] == 0) continue;
+      const auto& more = *next++;
+      if (!more) read[k].reset();
+      for (std::size_t i = 0; read[k] && i < more->size(); ++i) {
+        Pose& X = (*read[k])[i];
+        const Pose& to = (*more)[i];
+        X.x += shares[k] * (to.x - X.x);
+        X.y += shares[k] * (to.y - X.y);
+        X.theta += shares[k] * wrap_angle(to.theta - X.theta);
+      }
+    }
+    return read;
   }
 
   // What fails is far away, and ends the diagnosis where it is looked at next.
   std::vector<std::vector<Pose>> ends(const std::vector<Kinematics>& points, Asked& asked) {
     std::vector<std::optional<std::vector<Pose>>> all(points.size());
-    if (failure_) {
-      auto found = asked.forward(mapped(points, [&](const Kinematics& at) {
-        return PredictionRequest{asked_values(at), {}};
-      }));
-      if (!found) failure_ = found.error();
-      if (const auto& why = asked.predictor.broken()) {
-        failure_ = Error{"the program: " + *why, ErrorCode::kSimulation};
-      }
-      if (found) all = std::move(*found);
-    }
+    if (failure_) all = answers(points, asked);
     std::vector<std::vector<Pose>> read;
     const std::vector<Trial>& trials = asked.problem.log.trials;
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -174,11 +206,15 @@ GroundQuestion question_of_program(const Problem& problem, const GroundRobot& ro
         {"command_gain", {"command_units"}, "the gain of " + whose, {gain}});
     question.catalogue.push_back({"command_offset", {}, "what is added to " + whose, {offset}});
   }
+  for (std::size_t k = tuned.size(); k < question.rows.size(); ++k) {
+    question.rows[k].step = kProgramStep;
+  }
   // The rows of one value are the same to the digit wherever they stand.
   for (GroundHypothesis& h : question.catalogue) {
     for (KinematicRow& freed : h.freed) {
       const KinematicRow* row = find_by(question.rows, freed.name, &KinematicRow::name);
       if (row != nullptr) freed = *row;
+      freed.step = kProgramStep;
     }
   }
   return question;
@@ -193,6 +229,7 @@ std::vector<KinematicRow> tuned_rows(const Problem& problem, const std::vector<G
     if (gene.row >= own || p.kind != ParameterKind::kReal || !(gene.lower < gene.upper)) continue;
     rows.push_back({p.key, problem.values[gene.row], kTunedShare * (gene.upper - gene.lower),
                     "value", p.unit});
+    rows.back().tuned = true;
   }
   return rows;
 }

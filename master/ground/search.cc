@@ -180,9 +180,6 @@ const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
   return *likeliest;
 }
 
-// What closes as much, alone, as a fault of the log has to.
-double closed_by_fault() { return 3 * std::log(kFaultShrinks); }
-
 // A hypothesis of values that every fit moves has nothing to gain by being free; beside what is
 // named by now, the other values as the file has them, it may explain most, or all but what is
 // tolerated.
@@ -194,8 +191,8 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     return held_out_gain(fitter.windows(), with, without, work.seed);
   };
   if (gain(moved, named).lo < kToleratedGap) return std::nullopt;
-  std::vector<FitRow> rows_named;
-  Eigen::VectorXd values_named;
+  std::vector<FitRow> rows_named = tuned_rows(search.fit.rows);
+  Eigen::VectorXd values_named = nominals(rows_named);
   for (const GroundStep& step : search.steps) {
     rows_named = with_freed(std::move(rows_named), search.catalogue[step.chosen], &values_named);
   }
@@ -217,7 +214,8 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     c.held_out_gain = gain(c.held_out, named);
     c.offer.gain = alone.objective - as_it_stands;
     const bool all = gain(moved, c.held_out).hi < kToleratedGap;
-    if (c.held_out_gain.lo < (all ? kToleratedGap : closed_by_fault())) continue;
+    // As much as a fault of the log has to close.
+    if (c.held_out_gain.lo < (all ? kToleratedGap : 3 * std::log(kFaultShrinks))) continue;
     if (best) {
       const HeldOutGain over = gain(c.held_out, best->held_out);
       const bool longer =
@@ -357,7 +355,7 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   emit_faults(work, search);
   const WindowFitter fitter(robot, search.windows, search.reference, work.memo);
   stage(kCatalogueStage);
-  search.chain.push_back(fit_held_out(fitter, {}, {}));
+  search.chain.push_back(held_out_with(fitter, search, {}, search.fit));
   const GroundNames unnamed = search;
   while (search.steps.size() < kMostNames && take_step(fitter, work, &search)) {
   }
@@ -369,9 +367,11 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   emit_steps(work, search);
   stage(kRestStage);
   measure_rest(fitter, work, &search);
-  const bool far = std::ranges::any_of(search.steps, [&](const GroundStep& step) {
+  const auto is_far = [&](const GroundStep& step) {
     return tolerances_off(search.catalogue[step.chosen], search.fit) > kFarTolerances;
-  });
+  };
+  // What is tuned beside a value carries it far along for nothing.
+  const bool far = !search.windows.simulated && std::ranges::any_of(search.steps, is_far);
   if (!search.steps.empty() && !search.reference && !far) {
     const HeldOutGain all =
         held_out_gain(search.windows, search.best, search.chain.front(), work.seed);

@@ -190,6 +190,9 @@ std::string unexplained_text(double share, bool stood);
 // to pose; empty: they are not.
 std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search);
 
+// Those of a program's own parameters, which are tuned whatever is named.
+std::vector<FitRow> tuned_rows(const std::vector<FitRow>& rows);
+
 // Which names stand beside one another (stands.cc).
 
 // Whether the interval of what says how much of it there is, its first parameter, excludes none, or

@@ -103,6 +103,10 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
   return rows;
 }
 
+std::vector<FitRow> tuned_rows(const std::vector<FitRow>& rows) {
+  return filtered(rows, [](const FitRow& row) { return row.row.tuned; });
+}
+
 double tolerances_off(const GroundHypothesis& hypothesis, const WindowFit& fit) {
   return max_of(hypothesis.freed, [&](const KinematicRow& row) {
     return std::abs(fit.values[row_index(fit.rows, row.name)] - row.nominal) / row.tolerance;
@@ -128,8 +132,8 @@ bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const Gr
 
 WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,
                         const std::vector<std::size_t>& hypotheses, const WindowFit& fit) {
-  std::vector<FitRow> rows;
-  Eigen::VectorXd start;
+  std::vector<FitRow> rows = tuned_rows(fit.rows);
+  Eigen::VectorXd start = nominals(rows);
   for (const std::size_t h : hypotheses) {
     rows = with_freed(std::move(rows), search.catalogue[h], &start);
   }

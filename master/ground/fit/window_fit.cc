@@ -14,7 +14,6 @@ namespace gapfarm {
 namespace {
 
 constexpr int kSteps = 6;                            // of Gauss and Newton a round
-constexpr double kStepShare = 0.05;                  // of a row's tolerance: to find slopes
 constexpr double kFaster = 0.02;                     // to find how ends move with speed
 constexpr double kEnough = 1e-3;                     // nats a step
 constexpr double kGaussian = 1.4826, kOfTail = 1.3;  // of a median deviation
@@ -247,7 +246,8 @@ void WindowFitter::add_slopes(const WindowFit& fit, Eigen::Index first,
   std::vector<double> steps;
   std::vector<Eigen::VectorXd> points;
   for (Eigen::Index k = first; k < fit.values.size(); ++k) {
-    steps.push_back(kStepShare * fit.rows[static_cast<std::size_t>(k)].row.tolerance);
+    const KinematicRow& row = fit.rows[static_cast<std::size_t>(k)].row;
+    steps.push_back(row.step * row.tolerance);
     points.emplace_back(fit.values)[k] += steps.back();
   }
   const auto moved = residuals(fit.rows, points);

@@ -30,7 +30,8 @@ Pose follow(const std::vector<CommandRow>& commands, double start_s, double t, d
 // Every worker's program, without any.
 class ProgramOfRuns : public AnsweringFarm {
  public:
-  std::string fails;  // of every task
+  std::string fails;      // of every task
+  double step_s = 1e-12;  // at whose multiples it takes commands
 
  private:
   v1::TaskResult answer(const Problem& problem, const v1::Task& task) const override {
@@ -53,7 +54,7 @@ class ProgramOfRuns : public AnsweringFarm {
       const CommandedRun& run = problem.runs[*trial.run];
       std::vector<CommandRow> commands = run.commands;
       for (CommandRow& row : commands) {
-        row.t_s += value("delay");
+        row.t_s = step_s * std::ceil((row.t_s + value("delay")) / step_s - 1e-6);
         row.values = {value("v.gain") * row.values[0] + value("v.offset"),
                       value("omega.gain") * row.values[1] + value("omega.offset")};
       }
@@ -144,6 +145,27 @@ TEST(ProgramRuns, ADelayAndAGainAreNamedWithIntervalsThatHoldThem) {
   // The model has both put in.
   EXPECT_NEAR(problem.values[problem.table().row("delay")], 0.18, 0.01);
   EXPECT_NEAR(problem.values[problem.table().row("omega.gain")], 1.15, 0.01);
+}
+
+// Whose slopes by delays of less than a step were none, or many times too large, and kept every
+// value half way.  `speed` takes up a part of the gain, and gives it back once that has a name.
+TEST(ProgramRuns, AProgramThatTakesCommandsAtStepsOfItsOwnIsFollowed) {
+  Problem problem = problem_of("[genes]\nspeed = [0.5, 2]\n");
+  const std::vector<Gene> tuned = std::move(problem.genes);
+  problem.genes.clear();
+  ProgramOfRuns farm;
+  farm.step_s = 0.02;
+  const auto found = diagnose_program_runs(farm, tuned, driven({0.19, 1.1, 1.15}), {}, &problem);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  const Diagnosis& d = found->diagnosis;
+  const NamedEffect* delay = named(d, "command_delay");
+  const NamedEffect* gain = named(d, "command_gain");
+  ASSERT_TRUE(delay && gain) << d.headline;
+  EXPECT_EQ(d.effects.size(), 2u) << d.headline;
+  EXPECT_EQ(d.verdict, Verdict::kEffect) << d.headline;
+  EXPECT_NEAR(delay->parameters[0].value, 0.19, farm.step_s);
+  EXPECT_NEAR(gain->parameters[0].value, 0.15, 0.01);
+  EXPECT_NEAR(problem.values[problem.table().row("speed")], 1.1 * kSpeed, 0.01);
 }
 
 TEST(ProgramRuns, NothingIsNamedOfACleanLog) {
