@@ -115,6 +115,9 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes);
 // predictions, residuals and gain derivatives.
 Status tune_base(Predictor& predictor, bool keep, Study* study);
 
+// Where a parameter may be tuned to; a program may declare narrow bounds.
+std::pair<double, double> tunable(const Parameter& p);
+
 // Rows of the base's parameters whose value in `at` lies where tuning has to stop.
 std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
@@ -91,6 +92,23 @@ ParameterValues within_table(const DiagnosisRequest& of, const Overrides& at,
   return values;
 }
 
+// What a search of the config would not have found.
+std::optional<std::string> outside_genes(const DiagnosisRequest& of, const ParameterValues& tuned) {
+  std::vector<std::string> outside;
+  for (const Gene& gene : of.options.genes) {
+    const double value = tuned[gene.row];
+    if (value >= gene.lower && value <= gene.upper) continue;
+    const auto text = [&](double v) {
+      return of.table().format(gene.row, rounded_to_digits(v, 3));
+    };
+    outside.push_back(of.table()[gene.row].key + " " + text(value) + " (" + text(gene.lower) +
+                      " to " + text(gene.upper) + ")");
+  }
+  if (outside.empty()) return std::nullopt;
+  return "Tuned outside of what [genes] expect: " + listed(outside) +
+         ". Something that is not modelled may be what they make up for.";
+}
+
 std::vector<Screened> complete_rows(const DiagnosisRequest& of, const Screening& screening,
                                     const Judgement& judged) {
   std::vector<Screened> rows;
@@ -173,6 +191,9 @@ void fill_values(const DiagnosisRequest& of, const Refit& refit, DiagnosisResult
   set_noise(of, base.study.predictive_noise(), &tuned);
   set_spreads(of, refit, &final_);
   result->tuned = within_table(of, tuned, &result->diagnosis.cautions);
+  if (auto outside = outside_genes(of, result->tuned)) {
+    result->diagnosis.cautions.push_back(*std::move(outside));
+  }
   result->final_ = within_table(of, final_, &result->diagnosis.cautions);
   result->intervals.assign(of.problem.values.size(), {1, 0});
   for (const NamedEffect& effect : result->diagnosis.effects) {

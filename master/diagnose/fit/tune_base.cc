@@ -32,14 +32,6 @@ double most_turn(std::vector<double> turns, int round) {
   return std::max(kSureTurn / kShares[round], turns[std::min(kFewest, turns.size()) - 1]);
 }
 
-// Where a parameter may be tuned to; a program may declare narrow bounds.
-std::pair<double, double> tunable(const Parameter& p) {
-  const double lower = p.lower * kAboveLower, upper = p.upper * kBelowUpper;
-  if (lower < upper) return {lower, upper};
-  const double edge = (1 - kBelowUpper) * (p.upper - p.lower);
-  return {p.lower + edge, p.upper - edge};
-}
-
 // Change of every end for both sides' gain, from what lesser duties would do: no duty may be more
 // than full.  The parabola through three points, at its end.
 Result<Slope> slope_of_duties(Predictor& predictor, const Overrides& at,
@@ -152,6 +144,13 @@ Status fit_base(Predictor& predictor, Study* study) {
 }
 
 }  // namespace
+
+std::pair<double, double> tunable(const Parameter& p) {
+  const double lower = p.lower * kAboveLower, upper = p.upper * kBelowUpper;
+  if (lower < upper) return {lower, upper};
+  const double edge = (1 - kBelowUpper) * (p.upper - p.lower);
+  return {p.lower + edge, p.upper - edge};
+}
 
 std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at) {
   std::vector<std::size_t> rows;

@@ -229,9 +229,10 @@ SanityFinding on_bounds(const DiagnosisRequest& of, const Study& tuned) {
   std::vector<std::string> where;
   for (std::size_t row : tuned.on_bounds) {
     const Parameter& p = of.table()[row];
+    const auto [lower, upper] = tunable(p);
     where.push_back(p.key + " " + of.table().format(row, rounded_to_digits(tuned.base.at(row), 3)) +
-                    " (from " + of.table().format(row, p.lower) + " to " +
-                    of.table().format(row, p.upper) + ")");
+                    " (tuned within " + of.table().format(row, rounded_to_digits(lower, 3)) +
+                    " to " + of.table().format(row, rounded_to_digits(upper, 3)) + ")");
   }
   return {"base_on_bounds",
           "Tuning the base ended on the edge of what scenario " + of.problem.scenario +
