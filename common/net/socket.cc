@@ -347,6 +347,9 @@ DealerSocket::~DealerSocket() = default;
 Result<std::unique_ptr<DealerSocket>> DealerSocket::connect(const std::string& endpoint,
                                                             const SocketOptions& options) {
   RETURN_IF_ERROR(check_endpoint(endpoint));
+  if (is_tcp(endpoint) && (endpoint.ends_with(":0") || endpoint.ends_with(":*"))) {
+    return Error{"endpoint '" + endpoint + "' names no port; give the one that the master printed"};
+  }
   const LinkSecurity& security = options.security;
   const bool has_keys = security.own.has_value() && !security.master_key.empty();
   const bool open = security.open != OpenLinks::kNever;

@@ -43,8 +43,9 @@ Result<RunLock> RunLock::take(const std::filesystem::path& run) {
     std::ifstream in(file);
     std::string pid, host;
     in >> pid >> host;
-    return Error{run.string() + ": the run is in use by process " + (pid.empty() ? "?" : pid) +
-                 " on " + (host.empty() ? "an unknown host" : host) +
+    // A holder that has just begun has not written yet who it is.
+    return Error{run.string() + ": the run is in use by " +
+                 (host.empty() ? "another process" : "process " + pid + " on " + host) +
                  "; wait for it, stop it, or give another folder"};
   }
   const std::string owner = std::to_string(::getpid()) + " " + host_name() + "\n";
