@@ -1,5 +1,7 @@
 // Trials, parameters and single drives, as the report shows them.
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -16,6 +18,7 @@ namespace gapfarm::steps {
 namespace {
 
 constexpr double kHardlyMoved = 0.8;  // of the prior's spread: the data add next to nothing
+constexpr double kOneNumber = 0.95;   // a correlation: alone, each would be three times as sure
 constexpr double kShownInterval_s = 0.05;
 constexpr std::size_t kMostSamples = 40;  // of a path that is shown
 
@@ -190,11 +193,21 @@ void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisRe
       row->hi = std::min(row->after + half, row->upper);
     }
     if (p.standard_error > kHardlyMoved * prior_sd(study, study.base_parameters[k])) {
-      row->note = "the data hardly move it: it stays near the config's value";
+      row->note = "the data hardly move it";
     }
   }
   const Eigen::MatrixXd cov = covariance_of(study, fit);
-  if (cov.size() > 0) d.correlations = correlations_of(table, fit, cov);
+  if (cov.size() == 0) return;
+  d.correlations = correlations_of(table, fit, cov);
+  for (const ParameterCorrelation& c : d.correlations) {
+    const bool of_effect =
+        !table[table.row(c.a)].effect.empty() || !table[table.row(c.b)].effect.empty();
+    if (!of_effect || std::abs(c.r) < kOneNumber) continue;
+    d.cautions.push_back(fmt::format(
+        "These data know {} and {} as one number (correlation {:.2f}): take both values or "
+        "neither, or measure one and give it in [parameters].",
+        c.a, c.b, c.r));
+  }
 }
 
 Result<std::vector<ShownDrive>> shown_drives(const DiagnosisRequest& of,

@@ -171,7 +171,7 @@ std::vector<ParameterRow> example_parameters() {
        0.05,
        2,
        "",
-       "the data hardly move it: it stays near the config's value"},
+       "the data hardly move it"},
       {"battery_sag.rate",
        "1/min",
        "battery_sag",
