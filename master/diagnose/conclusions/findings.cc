@@ -225,12 +225,21 @@ std::vector<std::string> lacking(const LogVariety& v) {
 }
 
 std::string alias_sentence(const std::string& effect, const std::vector<std::string>& aliases,
-                           std::span<const std::string> lacks) {
-  if (aliases.empty()) return "";
-  std::string text = "In these data " + listed(aliases, "or") + " would explain about as much as " +
-                     effect + " in another way";
-  if (!lacks.empty()) text += "; the log lacks " + listed(lacks);
-  return text + ".";
+                           std::size_t alike, std::span<const std::string> lacks) {
+  const auto others = aliases.begin() + static_cast<std::ptrdiff_t>(alike);
+  const std::vector<std::string> well(aliases.begin(), others), rest(others, aliases.end());
+  std::vector<std::string> sentences;
+  if (!well.empty()) {
+    sentences.push_back("In these data " + listed(well, "or") + " would explain about as much as " +
+                        effect + " in another way" +
+                        (lacks.empty() ? "." : "; the log lacks " + listed(lacks) + "."));
+  }
+  if (!rest.empty()) {
+    sentences.push_back(listed(rest, "or") +
+                        " moves things in much the same way: these data prefer " + effect +
+                        " as far as contacts are simulated right.");
+  }
+  return joined(sentences, " ");
 }
 
 std::string few_trials_caution(std::size_t trials, const std::string& one,

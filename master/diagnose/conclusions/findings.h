@@ -77,9 +77,10 @@ LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Ce
 // What the log lacks and two effects would need to part: "several durations", ...
 std::vector<std::string> lacking(const LogVariety& variety);
 
-// One sentence; empty without aliases.  `lacks`: what the log would need to part them.
+// Of the first `alike`, which explain the log about as well, and of the others, which act alike;
+// empty without aliases.  `lacks`: what the log would need to part them.
 std::string alias_sentence(const std::string& effect, const std::vector<std::string>& aliases,
-                           std::span<const std::string> lacks);
+                           std::size_t alike, std::span<const std::string> lacks);
 
 // "There are 12 trials; below 60 ...": one sentence, where so few were made; else empty.
 std::string few_trials_caution(std::size_t trials, const std::string& one, const std::string& many);

@@ -86,9 +86,13 @@ NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size
   effect.name = chosen.effect();
   effect.aliases = chosen.aliases;
   // What is named beside it is no alternative to it.
-  std::erase_if(effect.aliases, [&](const std::string& alias) { return named.chose(alias); });
-  effect.alias_reason =
-      alias_sentence(effect.name, effect.aliases, of.subject.lacks(named.study(), of.problem.log));
+  const auto is_named = [&](const std::string& alias) { return named.chose(alias); };
+  std::erase_if(effect.aliases, is_named);
+  const auto first_other = chosen.aliases.begin() + static_cast<std::ptrdiff_t>(chosen.alike);
+  const auto alike = static_cast<std::size_t>(
+      chosen.alike - std::count_if(chosen.aliases.begin(), first_other, is_named));
+  effect.alias_reason = alias_sentence(effect.name, effect.aliases, alike,
+                                       of.subject.lacks(named.study(), of.problem.log));
   effect.confidence = confidence_of(chosen.gain, of.subject.least_gain);
   for (const auto& [row, value] : named.estimates->at) {
     const Parameter& p = of.table()[row];

@@ -19,6 +19,7 @@ struct EffectCandidate {
   double gain = 0;  // net of the signature's penalty, nats
   Signature signature;
   std::vector<std::string> aliases = {};  // of a chosen one: at most three, likeliest first
+  std::size_t alike = 0;                  // so many of these explain this log about as well
 
   const std::string& effect() const { return signature.effect; }
 };

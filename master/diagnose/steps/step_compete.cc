@@ -28,10 +28,10 @@ struct Found {
   DetectableSizes detectable;
 };
 
-// Hypotheses that predict as well as the best, as far as anybody can show.
-std::vector<std::string> aliases_of(const DiagnosisRequest& of, const std::string& effect,
-                                    const std::vector<infer::Hypothesis>& hypotheses,
-                                    const infer::Contest& contest) {
+// Hypotheses that predict as well as the best, as far as anybody can show, and what acts alike.
+void set_aliases(const DiagnosisRequest& of, const std::vector<infer::Hypothesis>& hypotheses,
+                 const infer::Contest& contest, EffectCandidate* chosen) {
+  const std::string& effect = chosen->effect();
   const infer::Contender& best = contest.contenders.front();
   std::vector<std::string> aliases;
   for (const infer::Contender& other : contest.contenders) {
@@ -43,13 +43,15 @@ std::vector<std::string> aliases_of(const DiagnosisRequest& of, const std::strin
       aliases.push_back(name);
     }
   }
+  const std::size_t alike = aliases.size();
   for (const char* constant : of.subject.effects->row(effect).aliases) {
     if (!contains(aliases, constant)) {
       aliases.emplace_back(constant);
     }
   }
   if (aliases.size() > kMostAliases) aliases.resize(kMostAliases);
-  return aliases;
+  chosen->alike = std::min(alike, aliases.size());
+  chosen->aliases = std::move(aliases);
 }
 
 std::string estimate_text(const DiagnosisRequest& of, const infer::Contender& c,
@@ -255,7 +257,7 @@ class Selection {
     EffectCandidate chosen;
     chosen.gain = best.gain;
     chosen.signature.effect = name;
-    chosen.aliases = aliases_of(of_, name, hypotheses, *contest);
+    set_aliases(of_, hypotheses, *contest, &chosen);
     found_->chosen.push_back(std::move(chosen));
     found_->model = std::move(best.model);
     if (Status s = drop_idle(); !s) return s.error();

@@ -380,12 +380,15 @@ TEST(Findings, ReportWhatThinDataCannotShow) {
   for (ResidualTrial& t : free) t.command = 0;
   rich.cells.back().kind = MotionKind::kWide;
   EXPECT_GT(log_variety(free, rich.cells, log).commands, 1u);
-  const std::string text = alias_sentence("com_offset", {"marker_offset"}, lacking(variety));
+  const std::string text = alias_sentence("com_offset", {"marker_offset"}, 1, lacking(variety));
   EXPECT_NE(text.find("marker_offset would explain about as much as com_offset"), std::string::npos)
       << text;
   EXPECT_NE(text.find("the log lacks several commands, several durations"), std::string::npos)
       << text;
-  EXPECT_EQ(alias_sentence("com_offset", {}, lacking(variety)), "");
+  EXPECT_EQ(alias_sentence("com_offset", {}, 0, lacking(variety)), "");
+  const std::string lost = alias_sentence("com_offset", {"marker_offset"}, 0, lacking(variety));
+  EXPECT_EQ(lost.find("about as much"), std::string::npos) << lost;
+  EXPECT_NE(lost.find("these data prefer com_offset"), std::string::npos) << lost;
 }
 
 }  // namespace
