@@ -6,12 +6,11 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 
-# Asserts stay alive, the standard library's too: they are cheap beside a physics step, and they
-# guard our own mistakes.  The sanitizers' presets bring flags of their own.
+# Asserts stay alive: they are cheap beside a physics step, and they guard our own mistakes.
+# The sanitizers' presets bring flags of their own.
 if(NOT GAPFARM_SANITIZE)
   set(CMAKE_CXX_FLAGS_RELEASE "-O2")
 endif()
-add_compile_definitions(_GLIBCXX_ASSERTIONS)
 # Results are part of the interface (docs/determinism.md): no contraction, no reassociation.
 add_compile_options(-ffp-contract=off)
 # Finding what to warn of is a twentieth of a whole build; who only builds has no use for it.
