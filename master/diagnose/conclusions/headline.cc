@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "common/base/text.h"
@@ -103,7 +104,9 @@ std::string action(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
     }
     if (diagnosis.where.empty()) return "Look at the worst drives below.";
     const Where& w = diagnosis.where.front();
-    return "Look first at how " + (w.command == "all" ? "all commands" : w.command) +
+    std::string motions = motions_of(w.command);
+    motions.front() = static_cast<char>(std::tolower(motions.front()));
+    return "Look first at how " + motions +
            (w.covariate.empty() ? " miss" : " depend on " + w.covariate) +
            ": the first row under where the model goes wrong.";
   }

@@ -323,7 +323,7 @@ TEST(Findings, AHeadlineIsALineAndAnAction) {
   EXPECT_NE(action(d).find("tuned.toml"), std::string::npos);
   d.verdict = Verdict::kUnknown;
   d.where = {{"forward", "x", "trend", "time", 1, 1, 0, "..."}};
-  EXPECT_NE(action(d).find("forward depend on time"), std::string::npos) << action(d);
+  EXPECT_NE(action(d).find("how forward drives depend on time"), std::string::npos) << action(d);
   for (const Effect& effect : srv1_effects()) {
     NamedEffect e;
     e.name = effect.name;
