@@ -103,7 +103,9 @@ std::optional<double> TomlSection::number_of(std::string_view key, const toml::n
     errors_->wrong_type(key, node, number_range(lower, upper, unit));
     return {};
   }
-  const double value = *node.value<double>();
+  // An integer of more digits than a double has is none to toml++.
+  const double value = node.is_integer() ? static_cast<double>(node.as_integer()->get())
+                                         : node.value<double>().value_or(NAN);
   if (std::isfinite(value) && value >= lower && value <= upper) return value;
   errors_->add(node, std::string(key) + " is " + format_double(value) + ", expected " +
                          number_range(lower, upper, unit));

@@ -250,6 +250,9 @@ TEST(Config, RefusesWhatIsOutOfRange) {
               HasSubstr("gene motor_lag.tau is written twice"));
   EXPECT_THAT(error_of("[commands.forward]\nleft = 2\n"),
               HasSubstr("left is 2, expected a number in [-1, 1] (duty)"));
+  EXPECT_THAT(error_of("[commands.forward]\nleft = 9007199254740993\n"),
+              HasSubstr("left is 9007199254740992, expected a number in [-1, 1] (duty)"))
+      << "of more digits than a double has";
   EXPECT_THAT(error_of("seed = -1\n"), HasSubstr("expected an integer of at least 0"));
   EXPECT_THAT(error_of("[fitness]\noutlier_share = 0.6\n"), HasSubstr("in [0, 0.5]"));
 }
