@@ -221,7 +221,7 @@ GroundQuestion question_of_program(const Problem& problem, const GroundRobot& ro
 }
 
 // The program's own parameters among the genes.
-std::vector<KinematicRow> tuned_rows(const Problem& problem, const std::vector<Gene>& genes) {
+std::vector<KinematicRow> rows_of_genes(const Problem& problem, const std::vector<Gene>& genes) {
   std::vector<KinematicRow> rows;
   const std::size_t own = problem.external->table.declaration().parameters.size();
   for (const Gene& gene : genes) {
@@ -283,7 +283,7 @@ Result<GroundDiagnosis> diagnose_program_runs(Farm& farm, const std::vector<Gene
         "does not take; give poses in a frame of the world"};
   }
   return guarded([&]() -> Result<GroundDiagnosis> {
-    std::vector<KinematicRow> rows = tuned_rows(*problem, tuned);
+    std::vector<KinematicRow> rows = rows_of_genes(*problem, tuned);
     if (!rows.empty()) {
       if (options.on_stage) options.on_stage(kGroundStages[0].name);
       RETURN_IF_ERROR(tune_program(farm, log, options, &rows, problem));

@@ -30,8 +30,8 @@ constexpr double kTimesAsNear = 3;  // put right
 constexpr double kAsWell = 1.1;     // of what two readings leave
 // Of the reach, of half of the pushes: a unit 2.54 times the right one leaves some 0.5.
 constexpr double kMeets = 0.1;
-constexpr double kTimesUsual = 4;    // what so many stay below:
-constexpr double kTrueShare = 0.75;  // false rows may be the rest
+constexpr double kTimesUsual = 4;    // what the share below stays under
+constexpr double kTrueShare = 0.75;  // of the pushes: the rest may be false
 
 // Of the finger, m.
 double way_of(const Trial& t) {
