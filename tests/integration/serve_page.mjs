@@ -306,7 +306,6 @@ try {
   writeFileSync(join(folder, "front.toml"), TRADED);
   const traded = start("evolve", "front.toml", "--out", "deep/front", "--generations", "8", "--workers", "1");
   check((await traded.ended) === 0, "the run of two objectives did not end well");
-  let live = evolve("live", "--generations", "400");
   const server = start("serve", ".", "--port", "0");
   const address = (await saidBy(server, /http:\/\/127\.0\.0\.1:\d+\//))?.[0];
   if (!address) throw new Error(`serve said ${server.said}`);
@@ -328,6 +327,9 @@ try {
   await first.picture("serve-whole");
   await first.close();
 
+  let live = evolve("live", "--generations", "400");
+  await saidBy(live, /evolving/);
+  await served(view("live"));
   const list = await open(address, { may });
   await until(list, `/3 here, 1 running/.test(document.getElementById("headline").textContent)`, "both runs are listed, one runs");
   await list.picture("serve-list");
