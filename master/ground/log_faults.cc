@@ -15,11 +15,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kOwnRounds = 10;  // of Gauss and Newton, for a run alone
-constexpr std::size_t kMostRuns = 9;
-// Of a run's clock, either way of the common delay.
-constexpr double kClockStep_s = 0.02, kFarClockStep_s = 0.05;
-constexpr int kClockSteps = 15, kFarClockSteps = 24;
+constexpr int kOwnRounds = 10;       // of Gauss and Newton, for a run alone
 constexpr double kNeverSo = -1e300;  // nats
 constexpr std::size_t kFewestApart = 10;
 constexpr double kNoisy = 2;
@@ -58,16 +54,6 @@ double objective_with_own_clock(const WindowFitter& fitter, std::vector<FitRow> 
   return fitter.fit(rows, {}, scan_delay(fitter, rows, values)).objective;
 }
 
-// Ascending: close to the common one in small steps.
-std::vector<double> clocks_about(double common_s) {
-  std::vector<double> all;
-  const double near_s = kClockStep_s * kClockSteps;
-  for (int k = -kFarClockSteps; k < 0; ++k) all.push_back(common_s - near_s + kFarClockStep_s * k);
-  for (int k = -kClockSteps; k <= kClockSteps; ++k) all.push_back(common_s + kClockStep_s * k);
-  for (int k = 1; k <= kFarClockSteps; ++k) all.push_back(common_s + near_s + kFarClockStep_s * k);
-  return all;
-}
-
 // How much closer a run is to what its own values expect than to those of all runs: the ratio of
 // its residuals, where the nats are no chance; 1: no closer.
 double own_values_shrink(const WindowFitter& fitter, const GroundSearch& search, std::size_t run) {
@@ -95,13 +81,6 @@ double own_values_shrink(const WindowFitter& fitter, const GroundSearch& search,
   return gain < kFaultGain ? 1 : std::exp(gain * windows.lengths / (3 * count));
 }
 
-// Of every window: how far it misses, in scales of its length.
-std::vector<double> misses(const WindowFit& fit, const WindowSet& windows) {
-  return mapped(indices(fit.residuals.size()), [&](std::size_t i) {
-    return fit.residuals[i].cwiseQuotient(fit.scales[windows.horizon[i]]).norm();
-  });
-}
-
 // The windows of a length in which the robot is to move: to drive or to turn half as fast as in
 // the fastest tenth of them.  Where it stands nothing misses.
 std::vector<std::size_t> moving(const std::vector<WindowSpeeds>& speeds, const WindowSet& windows,
@@ -117,7 +96,28 @@ std::vector<std::size_t> moving(const std::vector<WindowSpeeds>& speeds, const W
                   [&](std::size_t i) { return 2 * ahead(i) >= fast || 2 * turn(i) >= turning; });
 }
 
+// Of every window: how far it misses, in scales of its length.
+std::vector<double> misses(const WindowFit& fit, const WindowSet& windows) {
+  return mapped(indices(fit.residuals.size()), [&](std::size_t i) {
+    return fit.residuals[i].cwiseQuotient(fit.scales[windows.horizon[i]]).norm();
+  });
+}
+
 }  // namespace
+
+std::vector<double> times_farther(const WindowFit& fit, const WindowSet& windows) {
+  std::vector<std::vector<double>> of_runs(windows.run_blocks.size());
+  const std::vector<double> missed = misses(fit, windows);
+  for (std::size_t i = 0; i < missed.size(); ++i) of_runs[windows.run_of[i]].push_back(missed[i]);
+  return mapped(indices(of_runs.size()), [&](std::size_t r) {
+    std::vector<double> others;
+    for (std::size_t other = 0; other < of_runs.size(); ++other) {
+      if (other != r && !of_runs[other].empty()) others.push_back(median(of_runs[other]));
+    }
+    if (of_runs[r].empty() || others.size() < 2) return 0.0;
+    return median(of_runs[r]) / std::max(median(others), 1e-12);
+  });
+}
 
 Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog& log,
                                           const WindowSettings& settings) const {
@@ -205,6 +205,7 @@ Status search_faults(const GroundRobot& robot, const GroundQuestion& question,
     const WindowFitter fitter(robot, search->windows, question.reference, work.memo);
     search->fit = fitter.fit(search->fit.rows);
   }
+  RETURN_IF_ERROR(put_on_one_clock(robot, question, work, search));
   search->grid = grid_of(search->log);  // in metres by now
   return {};
 }
@@ -236,25 +237,16 @@ std::string far_windows(const WindowFitter& fitter, const GroundSearch& search, 
 }
 
 std::string far_runs(const WindowFitter& fitter, const GroundSearch& search) {
-  const WindowSet& windows = search.windows;
-  const std::vector<double> missed = misses(search.fit, windows);
-  std::vector<std::vector<double>> of_runs(windows.run_blocks.size());
-  for (std::size_t i = 0; i < missed.size(); ++i) of_runs[windows.run_of[i]].push_back(missed[i]);
   std::vector<std::string> far;
   bool all_own = true;
-  for (std::size_t r = 0; r < of_runs.size(); ++r) {
-    std::vector<double> others;
-    for (std::size_t other = 0; other < of_runs.size(); ++other) {
-      if (other != r && !of_runs[other].empty()) others.push_back(median(of_runs[other]));
-    }
-    if (of_runs[r].empty() || others.size() < 2) continue;
-    const double times = median(of_runs[r]) / std::max(median(others), 1e-12);
-    const bool has_own = times > kFaultShrinks && !windows.simulated && !search.reference &&
-                         own_values_shrink(fitter, search, r) > kFaultShrinks;
-    if (!has_own && !(times > kFarRun)) continue;
+  const std::vector<double> times = times_farther(search.fit, search.windows);
+  for (std::size_t r = 0; r < times.size(); ++r) {
+    const bool has_own = times[r] > kFaultShrinks && !search.windows.simulated &&
+                         !search.reference && own_values_shrink(fitter, search, r) > kFaultShrinks;
+    if (!has_own && !(times[r] > kFarRun)) continue;
     all_own = all_own && has_own;
     far.push_back(fmt::format("Run {} misses by {:.1f} times as much as the others{}.",
-                              search.log.runs[r].run, times,
+                              search.log.runs[r].run, times[r],
                               has_own ? ", and other values fit it" : ""));
   }
   if (far.empty()) return "";
@@ -336,37 +328,6 @@ std::string unexplained_text(double share, bool stood) {
       "{:.0f} % of what its motions differ by. Are these the commands and the poses of the same "
       "runs, row by row, and do both columns mean what the robot's file says?",
       100 * share);
-}
-
-std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search) {
-  const WindowFit& fit = search.fit;
-  const WindowSet& windows = search.windows;
-  const std::size_t runs = windows.run_blocks.size();
-  const Eigen::Index delay = row_index(fit.rows, "delay");
-  if (runs < 2 || runs > kMostRuns || delay < 0) return {};
-  const std::vector<double> delays = clocks_about(fit.values[delay]);
-  Eigen::MatrixXd nats = Eigen::MatrixXd::Zero(runs, delays.size());
-  for (std::size_t k = 0; k < delays.size(); ++k) {
-    Eigen::VectorXd values = fit.values;
-    values[delay] = delays[k];
-    const WindowFit held = fitter.hold(fit.rows, values);
-    for (std::size_t i = 0; i < held.nats.size(); ++i) {
-      nats(windows.run_of[i], k) += held.nats[i] / windows.lengths;
-    }
-  }
-  std::vector<std::string> clocks;
-  Eigen::RowVectorXd common = Eigen::RowVectorXd::Zero(nats.cols());
-  double own = 0;
-  for (std::size_t r = 0; r < runs; ++r) {
-    Eigen::Index best = 0;
-    const double most = nats.row(r).maxCoeff(&best);
-    if (best == 0 || best + 1 == nats.cols()) continue;  // no clock within reach
-    own += most;
-    common += nats.row(r);
-    clocks.push_back(fmt::format("{:+.2f} s in run {}", delays[best], search.log.runs[r].run));
-  }
-  const double least = kLeastChangeGain * (static_cast<double>(clocks.size()) - 1);
-  return clocks.size() < 2 || own - common.maxCoeff() < least ? "" : joined(clocks);
 }
 
 }  // namespace gapfarm

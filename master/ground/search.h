@@ -108,6 +108,7 @@ struct GroundSearch : GroundBasis, GroundNames {
   PoseGrid grid;                  // that the poses are rounded to
   StaleFrames stale;              // taken out of `log`
   RunChecks jumps;                // the same
+  std::string clocks;             // of which run was put right in `log`, as a caution
   RunLog log;
   WindowSet windows;   // of that log
   WindowFit free_fit;  // every row free
@@ -163,6 +164,9 @@ double gain_of(const WindowFitter& fitter, const GroundHypothesis& hypothesis,
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,
                                Eigen::VectorXd* values);
 
+// Of every run, by medians: how many times as far its windows miss as the others' do; 0: it or two
+// others have none.
+std::vector<double> times_farther(const WindowFit& fit, const WindowSet& windows);
 // Of three runs or more those whose windows miss by far more than the others' (kFarRun), medians
 // of each, and those that values of their own fit as much better as a fault is worth: commands of
 // another run, a world that is mirrored in this one alone, a wheel that slips.  "Run 3 misses by
@@ -184,10 +188,12 @@ bool hardly_moved(const RunLog& log);
 // A sentence about such a share, and what to look at; `stood`: hardly_moved().
 std::string unexplained_text(double share, bool stood);
 
-// The clocks of two to nine runs, where they are significantly apart: where each run has its own,
-// the windows are by so much better explained than by one for all.  More runs than these are drawn
-// again as they are, and stand for themselves.  "+0.10 s in run 1, -0.02 s in run 2", from command
-// to pose; empty: they are not.
+// One run of three to nine whose clock is far off the others' has its commands moved to theirs, in
+// the search's log.  Errors: no window fits.
+Status put_on_one_clock(const GroundRobot& robot, const GroundQuestion& question,
+                        const GroundWork& work, GroundSearch* search);
+// The clocks of two to nine runs, where they are significantly apart: "+0.10 s in run 1, -0.02 s in
+// run 2", from command to pose; empty: they are not.
 std::string clocks_apart(const WindowFitter& fitter, const GroundSearch& search);
 
 // Those of a program's own parameters, which are tuned whatever is named.

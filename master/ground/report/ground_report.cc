@@ -249,6 +249,7 @@ class GroundReport {
   }
 
   void clocks() {
+    if (!search_.clocks.empty()) d_.cautions.push_back(search_.clocks);
     // A run that is off by itself looks as if its clock were.
     const std::string runs = has_far_runs_ ? "" : clocks_apart(fitter_, search_);
     if (runs.empty()) return;

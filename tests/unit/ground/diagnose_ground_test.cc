@@ -127,35 +127,6 @@ TEST(DiagnoseGround, AClockThatIsFarOffIsNoUnit) {
   EXPECT_TRUE(contains(names, "wheel_separation")) << found.diagnosis.headline;
 }
 
-// Every run has a clock of its own: how far they are apart is in the interval of their mean,
-// however long each run is.
-TEST(DiagnoseGround, IsNoSurerOfAClockThanItsRunsAgree) {
-  const GroundRobot robot = robot_of(kDifferential);
-  const double clocks_s[] = {0.37, 0.23, 0.33, 0.35, 0.27};
-  RunLog log;
-  for (std::size_t r = 0; r < std::size(clocks_s); ++r) {
-    RunLog alike = driven(robot, off_by({"delay"}, {clocks_s[r]}));
-    log.channels = alike.channels;
-    log.runs.push_back(std::move(alike.runs[r]));
-  }
-  const GroundDiagnosis found = diagnosis_of(robot, log);
-  ASSERT_FALSE(found.diagnosis.effects.empty()) << found.diagnosis.headline;
-  const NamedEffect& effect = found.diagnosis.effects.front();
-  EXPECT_EQ(effect.name, "command_delay");
-  const Estimate& delay = effect.parameters.at(0);
-  EXPECT_LT(delay.lo, 0.31);
-  EXPECT_GT(delay.hi, 0.31);
-  EXPECT_GT(delay.hi - delay.lo, 0.05);  // 3.3 standard errors of these five are 0.082
-  const auto& cautions = found.diagnosis.cautions;
-  const auto apart = std::find_if(cautions.begin(), cautions.end(), [](const std::string& text) {
-    return text.find("clocks are apart") != text.npos;
-  });
-  ASSERT_NE(apart, cautions.end());
-  const std::size_t second = apart->find(" s in run 2");
-  ASSERT_NE(second, std::string::npos) << *apart;
-  EXPECT_NEAR(std::stod(apart->substr(second - 5, 5)), 0.23, 0.04) << *apart;
-}
-
 TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
   const GroundRobot robot = robot_of(kDifferential);
   const RunLog right = driven(robot, {});
