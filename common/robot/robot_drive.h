@@ -61,11 +61,6 @@ class RobotDrive {
 
   // When the wheels are commanded something else, before `until_s`.
   double next_change(double t_s, double until_s) const;
-  // Whether what wheels do depends on when a command came, beside how long it lasted.
-  bool remembers() const {
-    return robot_.motors.lag_s > 0 || wheel_lag_s_ > 0 ||
-           robot_.motors.acceleration_limit_m_s2.has_value();
-  }
   // Whether the wheels stand and are commanded to; and when the command differs.
   bool stands() const { return stands_; }
   double next_motion(double t_s) const;

@@ -126,11 +126,10 @@ std::vector<Pose> KinematicPaths::poses(const KinematicBody& body, std::size_t r
     // A step ends where a pose is asked for; commands count by how long they lasted before it.
     while (t < asked) {
       double end = std::min(t + kStep_s, asked);
-      // What lags or ramps up begins to when it is commanded to, not at a step's start by its mean.
-      if (drive.remembers()) {
-        const double change = drive.next_change(std::max(t, change_s + kApart_s), end);
-        if (change > t && change < end) end = change_s = change;
-      }
+      // What lags or ramps up begins to when it is commanded to, not at a step's start by its mean;
+      // nor may a first lag make any other difference.
+      const double change = drive.next_change(std::max(t, change_s + kApart_s), end);
+      if (change > t && change < end) end = change_s = change;
       const double dt = end - t;
       RobotPlace place;
       if (body.knows_place()) {
