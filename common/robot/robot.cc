@@ -81,7 +81,7 @@ const RobotWheel* driven_wheel(const GroundRobot& robot, std::optional<WheelSide
 void complete_controller(GroundRobot& robot) {
   ControllerKinematics& k = robot.controller;
   const RobotWheel* any = driven_wheel(robot);
-  if (robot.command != CommandKind::kTwist || is_steered(robot) || any == nullptr) return;
+  if (robot.command != CommandKind::kTwist || any == nullptr) return;
   if (!k.wheel_radius_m) {
     const RobotWheel* left = driven_wheel(robot, WheelSide::kLeft);
     const RobotWheel* right = driven_wheel(robot, WheelSide::kRight);

@@ -67,11 +67,31 @@ double CommandTrack::next_motion(double t_s) const {
   return std::numeric_limits<double>::infinity();
 }
 
+namespace {
+
+// How fast the driven axle of a steered robot rolls, m/s a unit of its commanded speed: its
+// controller makes of a twist what wheels as large as it believes would need.
+double rolls_a_unit(const GroundRobot& robot) {
+  double sum_m = 0, count = 0;
+  for (const RobotWheel& wheel : robot.wheels) {
+    if (!wheel.driven) continue;
+    sum_m += *wheel.radius_m;
+    count += 1;
+  }
+  if (count == 0) return 1;
+  const double radius_m = sum_m / count;
+  if (robot.command != CommandKind::kTwist) return radius_m;
+  return radius_m / robot.controller.wheel_radius_m.value_or(radius_m);
+}
+
+}  // namespace
+
 RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> commands,
                        double speed_m_s)
     : robot_(robot),
       track_(commands, robot.channels.size(), robot.motors.command_timeout_s),
       steered_(is_steered(robot)),
+      rolls_(steered_ ? rolls_a_unit(robot) : 1),
       wheel_lag_s_(steered_ ? robot.motors.drive_lag_s : robot.motors.lag_s),
       targets_(robot.wheels.size(), 0.0),
       limited_(robot.wheels.size(), 0.0),
@@ -249,11 +269,10 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
       const double v = at(commanded, v_);
       if (v != 0)
         wanted = angle_of(std::atan(at(commanded, omega_) * *robot_.controller.wheelbase_m / v));
-      speed = follow(0, dead(v), dt_s);
+      speed = follow(0, dead(v) * rolls_, dt_s);
     } else {
+      speed = follow(0, dead(at(commanded, speed_)) * rolls_, dt_s);
       const RobotWheel* driven = driven_wheel(robot_);
-      const double radius = driven == nullptr ? 1 : *driven->radius_m;
-      speed = follow(0, dead(at(commanded, speed_)) * radius, dt_s);
       steered_traction = driven != nullptr && driven->steered;
     }
     const double steered_rad = steer(wanted, dt_s);

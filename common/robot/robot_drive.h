@@ -83,6 +83,7 @@ class RobotDrive {
   const GroundRobot& robot_;
   CommandTrack track_;
   bool steered_;
+  double rolls_ = 1;  // m/s a unit of a steered robot's commanded speed
   double wheel_lag_s_;
   std::vector<int> channel_;  // of each wheel; -1: none
   int v_ = -1, omega_ = -1, vy_ = -1, throttle_ = -1, speed_ = -1, steering_ = -1;
