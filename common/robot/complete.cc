@@ -89,6 +89,13 @@ class Completion {
     for (RobotWheel& w : r_.wheels) {
       if (w.kind == WheelKind::kCaster) w.driven = false;
     }
+    for (const RobotWheel& w : r_.wheels) {
+      if (!w.steered || !w.x_m || *w.x_m >= 0) continue;
+      return Error{"wheel " + w.name + " is steered and stands behind the axle that is not (x " +
+                   digits4(*w.x_m) +
+                   " m), expected one ahead of it; turn the frame round, x towards the steered "
+                   "wheel, and negate the commanded speeds"};
+    }
     static constexpr Status (Completion::*kOfDrive[])() = {
         &Completion::differential, &Completion::skid,      &Completion::tracked, &Completion::omni,
         &Completion::mecanum,      &Completion::ackermann, &Completion::tricycle};

@@ -40,6 +40,21 @@ TEST(CompleteRobot, PlacesASkidSteersAxlesWhereItsMultiplierReports) {
   EXPECT_EQ(robot.wheel("rear_right")->group, "right");
 }
 
+TEST(CompleteRobot, SteersNoWheelBehindTheOthers) {
+  GroundRobot robot;
+  robot.drive = DriveKind::kTricycle;
+  robot.controller.wheelbase_m = 0.9;
+  RobotWheel& rear = robot.wheels.emplace_back();
+  rear.name = "rear";
+  rear.steered = true;
+  rear.x_m = -0.9;
+  rear.radius_m = 0.1;
+  const Status completed = complete_robot(&robot);
+  ASSERT_FALSE(completed.ok());
+  EXPECT_NE(completed.error().message.find("turn the frame round"), std::string::npos)
+      << completed.error().message;
+}
+
 TEST(CompleteRobot, CrossesTheRollersOfAMecanumDrive) {
   GroundRobot robot;
   robot.drive = DriveKind::kMecanum;
