@@ -130,6 +130,19 @@ TEST_F(Overwrite, TheRobotsFileOfAConfigIsAnInput) {
               HasSubstr("no value \"separatio\", expected one of left, right, separation"));
 }
 
+TEST_F(Overwrite, TheLogOfARobotIsAnInput) {
+  const std::string rover = GAPFARM_SOURCE_DIR "/configs/rover/";
+  const std::string poses = folder_.write("drive/poses.csv", "run,t,x,y,theta\n1,0,0,0,0\n");
+  folder_.write("drive/commands.csv", "run,t,v,omega\n1,0,0,0\n");
+  const std::string read = "is read by this command";
+  refused({"init", rover + "rover.urdf", rover + "control.yaml", folder_ / "drive", "--out", poses,
+           "--force"},
+          poses, read);
+  refused({"robot", rover + "rover.urdf", "--controllers", rover + "control.yaml", "--out", poses,
+           "--config", folder_ / "c2.toml", "--runs", folder_ / "drive", "--force"},
+          poses, read);
+}
+
 TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {
   ASSERT_EQ(gapfarm_command({"evolve", config_, "--trials", log_, "--out", folder_ / "run",
                              "--generations", "1", "--workers", "1"})

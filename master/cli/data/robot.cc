@@ -112,11 +112,12 @@ Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
   texts.completed = reading.robot;
   if (const Status s = complete_robot(&texts.completed); !s) {
     return Error{setup.files[0] + ": " + s.error().message +
-                 "; state it in a robot.toml (docs/formats.md) and give that"};
+                 "; a robot.toml (docs/formats.md) can state it"};
   }
   for (const auto* files : {&setup.files, &setup.controllers}) {
     for (const std::string& file : *files) outputs.reads(file);
   }
+  outputs.reads_runs(setup.runs);
   RobotConfigTexts config_texts;
   const auto add = [](const std::vector<std::string>& sentences, std::vector<std::string>& to) {
     append(to, mapped(sentences, printable));
@@ -213,10 +214,11 @@ Result<int> run_init_robot(const std::vector<std::string>& arguments, const std:
 void show_config(const std::string& out, const std::string& of, const std::string& text, Json json,
                  Console& console) {
   if (out == "-") json["config"] = text;
+  const bool asks = text.find("QUESTION:") != std::string::npos;
   console.result(out == "-" ? text
                             : out + ": a config for " + of +
-                                  "; answer its QUESTIONs, then: gapfarm check " +
-                                  shell_quoted(out) + "\n",
+                                  (asks ? "; answer its QUESTIONs, then: " : "; next: ") +
+                                  "gapfarm check " + shell_quoted(out) + "\n",
                  json);
 }
 
