@@ -32,9 +32,13 @@ const std::vector<NumberKeys> kNumbers = {
     {"wheel_radius", 0.5, {"wheel_diameter", "wheelDiameter", "actuatedWheelDiameter"}},
     {"front_wheel_radius", 1, {"front_wheels_radius", "front_wheel_radius"}},
     {"wheel_separation_multiplier", 1, {"wheel_separation_multiplier"}},
-    {"left_wheel_radius_multiplier", 1, {"left_wheel_radius_multiplier"}},
-    {"right_wheel_radius_multiplier", 1, {"right_wheel_radius_multiplier"}},
-    {"wheelbase", 1, {"wheelbase", "wheel_base", "wheelBase"}},
+    {"left_wheel_radius_multiplier",
+     1,
+     {"left_wheel_radius_multiplier", "wheel_radius_multiplier"}},
+    {"right_wheel_radius_multiplier",
+     1,
+     {"right_wheel_radius_multiplier", "wheel_radius_multiplier"}},
+    {"wheelbase", 1, {"wheelbase", "wheel_base", "wheelBase", "wheel_separation_h"}},
     {"traction_track_width", 1, {"traction_track_width", "rear_wheel_track", "wheel_track"}},
     {"steering_track_width", 1, {"steering_track_width", "front_wheel_track", "kingpin_width"}},
     {"lx_plus_ly", 1, {"kinematics.sum_of_robot_center_projection_on_X_Y_axis"}},
@@ -89,17 +93,38 @@ constexpr TypeWord kTypes[] = {
     {"diff", "differential"},   {"libgazebo_ros_create", "differential"},
 };
 
+// Limits may be none: .nan, .inf.
+bool is_limit(std::string_view key) { return key.find("max_") != key.npos; }
+
+// Puts a number under every name that has this key.  False when none has.
+bool take_number(DriveFacts& facts, std::string_view key, const std::vector<std::string>& values,
+                 int line) {
+  bool known = false;
+  for (const NumberKeys& row : kNumbers) {
+    if (!contains(row.written, key)) continue;
+    known = true;
+    const auto value = values.size() == 1 ? parse_double(values[0]) : std::nullopt;
+    if (!value || !std::isfinite(*value)) {
+      if (!is_limit(key)) facts.unread.push_back({std::string(key), joined(values), line});
+      return true;
+    }
+    // Of ros2_controllers' tricycle_controller alone, in ms.
+    const bool in_ms =
+        key == "cmd_vel_timeout" && facts.type.find("tricycle_controller") != std::string::npos;
+    const StatedNumber stated{*value * row.scale * (in_ms ? 1e-3 : 1), std::string(key), line};
+    const auto [there, is_new] = facts.numbers.emplace(row.name, stated);
+    if (!is_new && there->second.key == key && there->second.value != stated.value) {
+      facts.unread.push_back({std::string(key), values[0], line});
+    }
+  }
+  return known;
+}
+
 // Puts one "key = value" (keys of maps joined by dots, a list as several values) where it belongs.
 // False when no table knows the key.
 bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::string>& values,
                int line) {
-  for (const NumberKeys& row : kNumbers) {
-    if (!contains(row.written, key) || values.size() != 1) continue;
-    const auto value = parse_double(values[0]);
-    if (!value || !std::isfinite(*value)) return false;
-    facts.numbers.emplace(row.name, StatedNumber{*value * row.scale, std::string(key), line});
-    return true;
-  }
+  if (take_number(facts, key, values, line)) return true;
   for (const JointKeys& row : kJoints) {
     if (!contains(row.written, key)) continue;
     StatedJoints& stated = facts.joints[row.role];
@@ -113,6 +138,33 @@ bool take_fact(DriveFacts& facts, std::string_view key, const std::vector<std::s
     return true;
   }
   return false;
+}
+
+// Whether two words differ in two neighbouring letters at most.
+bool is_slip_of(std::string_view word, std::string_view known) {
+  const std::size_t longer = std::max(word.size(), known.size());
+  const auto from_begin = std::ranges::mismatch(word, known).in1 - word.begin();
+  const auto from_end = std::mismatch(word.rbegin(), word.rend(), known.rbegin(), known.rend());
+  const auto same = from_begin + (from_end.first - word.rbegin());
+  return same + 2 >= static_cast<std::ptrdiff_t>(longer);
+}
+
+// What a key that nobody reads may have been meant to be, or changes; empty: neither.
+std::string unknown_key(std::string_view key, const std::vector<std::string>& values) {
+  std::vector<std::string_view> known;
+  for (const NumberKeys& row : kNumbers) append(known, row.written);
+  for (const JointKeys& row : kJoints) append(known, row.written);
+  for (const std::string_view word : known) {
+    // A limit's other end is no slip.
+    if (!is_limit(word) && is_slip_of(key, word)) {
+      return " is not read; did you mean '" + std::string(word) + "'?";
+    }
+  }
+  const bool scales = key.find("multiplier") != key.npos;
+  const auto value = values.size() == 1 ? parse_double(values[0]) : std::nullopt;
+  if (!scales && key.find("base_frame_offset") == key.npos) return "";
+  if (!value || *value == (scales ? 1 : 0)) return "";
+  return " " + values[0] + " is not read; put it into the robot's file (docs/formats.md)";
 }
 
 // The drive that a controller's or plugin's type names; empty when none.
@@ -140,6 +192,18 @@ std::vector<std::string> DriveFacts::joints_of(const std::vector<std::string>& r
     }
   }
   return all;
+}
+
+std::string unread_text(const DriveFacts& facts) {
+  const UnreadNumber& first = facts.unread.front();
+  const StatedNumber* there = nullptr;
+  for (const auto& [name, number] : facts.numbers) {
+    if (number.key == first.key) there = &number;
+  }
+  return facts.place(first.line) + ": found " + first.key + " '" + first.value + "', " +
+         (there == nullptr
+              ? "expected one number, in m, s or rad; write it so, with a point and without a unit"
+              : "but line " + std::to_string(there->line) + " has another; keep one of them");
 }
 
 std::string DriveFacts::place(int at_line) const { return file + ":" + std::to_string(at_line); }
@@ -259,7 +323,12 @@ class YamlReader {
     if (type != types_.end()) facts.type = type->second;
     std::vector<Entry> entries;
     flatten(parameters_of(node), "", 0, entries);
-    for (const Entry& entry : entries) take_fact(facts, entry.key, entry.values, entry.line);
+    for (const Entry& entry : entries) {
+      if (take_fact(facts, entry.key, entry.values, entry.line)) continue;
+      const std::string meant = unknown_key(entry.key, entry.values);
+      if (meant.empty()) continue;
+      facts.remarks.push_back(facts.place(entry.line) + ": " + entry.key + meant);
+    }
     const bool sizes = std::ranges::any_of(facts.numbers, [](const auto& n) {
       return n.first == "wheel_separation" || n.first == "wheelbase" || n.first == "lx_plus_ly" ||
              n.first == "wheel_radius" || n.first == "robot_radius";
@@ -283,6 +352,7 @@ class YamlReader {
   }
 
   void check(const DriveFacts& facts) {
+    if (!facts.unread.empty() && !error_) error_ = Error{unread_text(facts)};
     for (const char* name : {"wheel_separation", "wheel_radius", "wheelbase", "lx_plus_ly",
                              "wheel_separation_multiplier", "left_wheel_radius_multiplier",
                              "right_wheel_radius_multiplier"}) {

@@ -23,6 +23,13 @@ struct StatedJoints {
   int line = 0;
 };
 
+// A size that is written as no number, or a second time.
+struct UnreadNumber {
+  std::string key;
+  std::string value;
+  int line = 0;
+};
+
 // One controller or plugin.
 struct DriveFacts {
   std::string file;
@@ -39,6 +46,8 @@ struct DriveFacts {
   std::map<std::string, StatedNumber> numbers;
   // left, right, traction, steering, omni, front_left, front_right, rear_left, rear_right.
   std::map<std::string, StatedJoints> joints;
+  std::vector<UnreadNumber> unread;
+  std::vector<std::string> remarks;  // keys that may be misspelt, or change what is not modelled
 
   const StatedNumber* number(const std::string& name) const;
   // All joints named under any of `roles`, in that order, each once.
@@ -46,6 +55,9 @@ struct DriveFacts {
   // "controllers.yaml:12".
   std::string place(int at_line) const;
 };
+
+// The first of what is unread, with its place and the remedy.  REQUIRES: there is one.
+std::string unread_text(const DriveFacts& facts);
 
 // The plugins of `model` that drive it.
 std::vector<DriveFacts> plugin_facts(const UrdfModel& model);
@@ -57,7 +69,7 @@ struct ControllerFile {
 };
 
 // Errors with file and line: no YAML, no map, no controller that drives wheels (those that are
-// there are named), a size that is not above zero.
+// there are named), a size that is not above zero, is no number or stands twice.
 Result<ControllerFile> parse_controllers(std::string_view text, const std::string& file);
 
 }  // namespace gapfarm

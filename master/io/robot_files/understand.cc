@@ -40,6 +40,10 @@ class Understanding {
     ASSIGN_OR_RETURN(chassis_, find_chassis(model_, facts_));
     remark(model_.notes);
     remark(chassis_.remarks);
+    for (const DriveFacts& facts : facts_) {
+      remark(facts.remarks);
+      if (!facts.unread.empty()) return Error{unread_text(facts)};
+    }
     mark_driven();
     ASSIGN_OR_RETURN(guess_, guess_drive(model_, chassis_, facts_));
     robot().drive = guess_.drive;

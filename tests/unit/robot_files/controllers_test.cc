@@ -89,6 +89,51 @@ TEST(Controllers, ErrorsReportWhereAndWhat) {
               AllOf(StartsWith("c.yaml:3: "), HasSubstr("above 0")));
 }
 
+TEST(Controllers, SizesThatAreNoNumbersAreRefused) {
+  for (const char* size : {".inf", ".nan", "170 mm", "\"0,17\"", "[0.1, 0.2]", "wide"}) {
+    EXPECT_THAT(
+        error_of(std::string("d:\n  wheel_radius: 0.1\n  wheel_separation: ") + size + "\n"),
+        AllOf(StartsWith("c.yaml:3: found wheel_separation '"), HasSubstr("one number")))
+        << size;
+  }
+  EXPECT_THAT(
+      error_of("d:\n  wheel_separation: 0.16\n  wheel_radius: 0.1\n  wheel_separation: 0.18\n"),
+      AllOf(StartsWith("c.yaml:4: "), HasSubstr("line 2 has another")));
+  // Limits may be none.
+  EXPECT_EQ(error_of("d:\n  wheel_separation: 0.16\n  linear.x.max_velocity: .nan\n"), "");
+}
+
+TEST(Controllers, KeysOfOlderControllersAreRead) {
+  const auto read = parse_controllers(R"(
+d:
+  type: diff_drive_controller/DiffDriveController
+  wheel_separation: 0.5
+  wheel_radius_multiplier: 1.07
+a:
+  type: ackermann_steering_controller/AckermannSteeringController
+  wheel_separation_h: 0.34
+  steer_pos_multiplier: 1.3
+  front_steering: true
+  linear.x.min_velocity: -1
+t:
+  type: tricycle_controller/TricycleController
+  wheelbase: 0.9
+  wheel_radus: 0.12
+  cmd_vel_timeout: 500
+)",
+                                      "c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->drives.size(), 3u);
+  const DriveFacts &diff = read->drives[0], &car = read->drives[1], &tricycle = read->drives[2];
+  EXPECT_EQ(diff.number("left_wheel_radius_multiplier")->value, 1.07);
+  EXPECT_EQ(diff.number("right_wheel_radius_multiplier")->value, 1.07);
+  EXPECT_EQ(car.number("wheelbase")->value, 0.34);
+  EXPECT_THAT(car.remarks,
+              ElementsAre(HasSubstr("c.yaml:9: steer_pos_multiplier 1.3 is not read")));
+  EXPECT_EQ(tricycle.number("cmd_vel_timeout")->value, 0.5);
+  EXPECT_THAT(tricycle.remarks, ElementsAre(HasSubstr("did you mean 'wheel_radius'?")));
+}
+
 TEST(Controllers, AliasesOfAliasesEnd) {
   std::string bomb = "a0: &a0 {x: 1, y: 2}\n";
   for (int i = 1; i < 40; ++i) {
