@@ -25,6 +25,8 @@ constexpr double kMostSpread = 3;            // over the median command's
 constexpr std::size_t kOfWhichByChance = 4;  // false readings, one on the way
 constexpr std::size_t kOfWhichAlone = 200;   // trials, one that is like no other
 constexpr double kTimesTheOthers = 4;        // as any other: no effect of few trials
+// Reaches of a command: so far from its own a drive is another one's whose it is as near as this.
+constexpr double kFarFromItsOwn = 2, kNearAnother = 0.5;
 constexpr int kStepsOfWay = 20;
 // Pushes of one name deviate by less (median) where they are one push again and again: practice
 // logs stay below 8 mm and 0.04 rad.
@@ -179,6 +181,18 @@ class Drives {
     return cell ? cell->distance(between(trials_[i].X_WS, trials_[i].X_WE), cell->end) : 0;
   }
 
+  // Whether it ends far from where drives of its command do and lead through, and where another
+  // one's end.
+  bool is_of_another(std::size_t i) const {
+    if (!trials_[i].tip.empty() || distance(i) < kFarFromItsOwn) return false;
+    const Pose X_SE = between(trials_[i].X_WS, trials_[i].X_WE);
+    if (cells_.at(commands_[i])->holds_on_the_way(X_SE)) return false;  // late, say
+    return std::ranges::any_of(cells_, [&](const auto& one) {
+      const auto& [command, cell] = one;
+      return cell && command != commands_[i] && cell->distance(X_SE, cell->end) < kNearAnother;
+    });
+  }
+
   bool has_false_start(std::size_t i) const {
     const Trial& t = trials_[i];
     const auto& cell = cells_.at(commands_[i]);
@@ -212,6 +226,14 @@ double farthest_of_others(std::vector<double> distances, double usual) {
     if (distances[k] > kTimesTheOthers * others) limit = others;
   }
   return limit;
+}
+
+std::vector<std::size_t> exchanged_commands(const Problem& problem) {
+  const Drives drives(problem);
+  const auto trials = indices(problem.log.trials.size());
+  auto rows = filtered(trials, [&](std::size_t i) { return drives.is_of_another(i); });
+  if (static_cast<double>(rows.size()) > kMostFalse * static_cast<double>(trials.size())) return {};
+  return rows;
 }
 
 std::vector<std::size_t> false_readings(const Problem& problem) {

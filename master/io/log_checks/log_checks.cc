@@ -39,6 +39,7 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"headings_rounded", "headings are rounded"},
       {"impossible_rows", "some rows cannot be"},
       {"false_readings", "some readings are false"},
+      {"commands_exchanged", "some commands are another trial's"},
       {"tip_jumps", "the finger jumps"}};
   if (const std::string* phrase = find_in(phrases, finding.name)) return *phrase;
   std::string words = finding.name;

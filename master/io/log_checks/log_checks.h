@@ -98,6 +98,10 @@ const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, dou
 // repeats, and where there are so many that there is no knowing which readings are false.
 std::vector<std::size_t> false_readings(const Problem& problem);
 
+// Drives that end far from where those of their command do, and where those of another one do.
+// Empty where there are so many that there is no knowing which commands are whose.
+std::vector<std::size_t> exchanged_commands(const Problem& problem);
+
 // Pushes that end with their finger deep in the piece, or farther from where they began than the
 // finger went.  Drives have no finger.
 std::vector<std::size_t> against_their_fingers(const Problem& problem);
@@ -119,8 +123,9 @@ void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings);
 // The worst first.  A pure function of log and config that takes milliseconds; robust against a few
 // per cent of wild rows.  `impossible`: set to the trials that cannot be, ascending: drives for
 // which the robot would have had to move at more than twice the log's own speed and 30 cm beyond
-// (none where they are so many that the speed itself is in question), and trials that other
-// readings contradict (false_readings()), and pushes whose finger jumps (check_tip_jumps()).
+// (none where they are so many that the speed itself is in question), those of another command
+// (exchanged_commands()), trials that other readings contradict (false_readings()), and pushes
+// whose finger jumps (check_tip_jumps()).
 std::vector<SanityFinding> check_sanity(const Problem& problem,
                                         std::vector<std::size_t>* impossible = nullptr);
 

@@ -139,12 +139,13 @@ void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
 }
 
 struct ImpossibleTrials {
-  std::vector<std::size_t> fast, contradicted;  // no trial is both
+  std::vector<std::size_t> fast, exchanged, contradicted;  // no trial is two of them
   TipJumps finger = {};
 
   std::vector<std::size_t> rows() const {
     std::set<std::size_t> all(finger.trials.begin(), finger.trials.end());
     all.insert(fast.begin(), fast.end());
+    all.insert(exchanged.begin(), exchanged.end());
     all.insert(contradicted.begin(), contradicted.end());
     return {all.begin(), all.end()};
   }
@@ -155,8 +156,11 @@ ImpossibleTrials find_impossible(const Problem& problem) {
   if (has_drives(problem)) found.fast = too_fast_trials(problem);
   if (problem.scenario == "push") found.finger = check_tip_jumps(problem.log);
   if (!has_drives(problem) && problem.scenario != "push") return found;
-  std::ranges::set_difference(false_readings(problem), found.fast,
-                              std::back_inserter(found.contradicted));
+  std::ranges::set_difference(exchanged_commands(problem), found.fast,
+                              std::back_inserter(found.exchanged));
+  found.contradicted = filtered(false_readings(problem), [&](std::size_t row) {
+    return !contains(found.fast, row) && !contains(found.exchanged, row);
+  });
   return found;
 }
 
@@ -165,11 +169,15 @@ void note_impossible(const Problem& problem, const ImpossibleTrials& found,
   append(*findings, found.finger.findings);
   note_rows(problem, found.fast, "impossible_rows",
             "end farther from their start than twice the log's own speed leads", findings);
+  note_rows(problem, found.exchanged, "commands_exchanged",
+            "end far from where drives of their command do, and where another command leads",
+            findings);
+  const std::string more =
+      problem.scenario == "push" ? "no finger can have been there" : "it repeats their start";
   note_rows(problem, found.contradicted, "false_readings",
             "end where no other of their command does, and the reading before or after contradicts "
-            "theirs, others repeat it to the last digit, no finger can have been there, or nothing "
-            "else is as "
-            "far off",
+            "theirs, others repeat it to the last digit, " +
+                more + ", or nothing else is as far off",
             findings);
 }
 

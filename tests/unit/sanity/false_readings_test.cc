@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <functional>
+#include <set>
 
 #include "tests/unit/sanity/drawn_drives.h"
 
@@ -69,6 +70,31 @@ TEST(FalseReadings, BelievesReadingsThatOthersConfirm) {
     t.X_WE = t.X_WS * exp(0.6 * log(between(t.X_WS, t.X_WE)));
   }
   EXPECT_EQ(impossible_trials(late), std::vector<std::size_t>());
+}
+
+// Two in a hundred rows that have another trial's command: their readings are right, and confirmed.
+TEST(FalseReadings, KnowsCommandsOfOtherTrials) {
+  for (Problem log : {chained_drives(600), drawn_drives(600)}) {
+    std::vector<Trial>& trials = log.log.trials;
+    std::set<std::size_t> exchanged;
+    for (std::size_t i = 40; i < 600; i += 100) {
+      std::size_t other = i + 1;
+      while (*trials[other].left * *trials[i].left > 0 ||
+             *trials[other].right * *trials[i].right > 0) {
+        ++other;  // to one that leads elsewhere altogether
+      }
+      std::swap(trials[i].command, trials[other].command);
+      std::swap(trials[i].left, trials[other].left);
+      std::swap(trials[i].right, trials[other].right);
+      std::swap(trials[i].duration_s, trials[other].duration_s);
+      exchanged.insert({i, other});
+    }
+    // A turn of half a circle is on the way of another one.
+    const std::vector<std::size_t> rows = impossible_trials(log);
+    EXPECT_THAT(exchanged, testing::IsSupersetOf(rows));
+    EXPECT_GE(rows.size() + 2, exchanged.size());
+    EXPECT_EQ(first_name(log), "commands_exchanged");
+  }
 }
 
 TEST(FalseReadings, LeavesOutWhatIsLikeNoOther) {
