@@ -20,8 +20,24 @@ std::vector<double> tried_ages() {
   return ages;
 }
 
+const double kLeastSided = std::log(20);  // nats: one chance in twenty
+
 // Log density of each reading if it was that late, less if it was in time.
 using Evidence = std::function<std::vector<double>(double age_s)>;
+
+// Readings that are far off for another reason are so either way.  Nats for late ones alone over as
+// many that fell behind as ran ahead, which none can.
+double sided(const Evidence& evidence, const LatencyFit& fit) {
+  const std::vector<double> late = evidence(fit.latency_s), early = evidence(-fit.latency_s);
+  double nats = 0;
+  for (std::size_t k = 0; k < late.size(); ++k) {
+    const double behind = std::exp(std::min(late[k], 600.0)),
+                 ahead = std::exp(std::min(early[k], 600.0));
+    nats += std::log((1 - fit.share + fit.share * behind) /
+                     (1 - fit.share + fit.share * (behind + ahead) / 2));
+  }
+  return nats;
+}
 
 // Best age and share of the mixture; no weights.
 LatencyFit best_mixture(const Evidence& evidence, std::span<const double> shares) {
@@ -183,6 +199,7 @@ LatencyFit fit_latency(std::span<const ReadingGap> gaps,
     return ratios;
   };
   best = best_mixture(evidence, kShares);
+  if (best.gain > 0 && sided(evidence, best) < kLeastSided) best.gain = 0;
   best.weights.assign(trials, best.share);
   for (const ReadingGap& g : gaps) {
     if (best.gain <= 0) break;
