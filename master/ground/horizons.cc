@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
@@ -245,6 +246,28 @@ std::string format_horizons(const Horizons& horizons) {
     text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i], horizons.kinematics.values[i]);
   }
   return text + "\n";
+}
+
+Json horizons_json(const Horizons& horizons) {
+  const auto errors = [](const WindowErrors& e) {
+    return Json{{"position_m", e.position_m},
+                {"heading_rad", e.heading_rad},
+                {"position_m_m", e.position_m_m},
+                {"heading_rad_m", e.heading_rad_m}};
+  };
+  Json json = {{"rows", Json::array()}, {"unfinished_runs", horizons.unfinished_runs}};
+  for (const HorizonRow& row : horizons.rows) {
+    Json& one = json["rows"].emplace_back(Json{{"horizon_s", row.horizon_s},
+                                               {"windows", row.windows},
+                                               {"travel_m", row.travel_m},
+                                               {"log_score", row.log_score},
+                                               {"simulation", errors(row.simulation)},
+                                               {"constant_velocity", errors(row.constant_velocity)},
+                                               {"position_ratio", row.position.ratio},
+                                               {"heading_ratio", row.heading.ratio}});
+    if (!horizons.kinematics.names.empty()) one["kinematics"] = errors(row.kinematics);
+  }
+  return json;
 }
 
 std::string windows_csv(const Horizons& horizons) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/json/json.h"
 #include "common/problem/problem.h"
 #include "common/recordings/run.h"
 #include "common/score/kinematic.h"
@@ -77,6 +78,10 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
 
 // A table, and how many of its medians are significantly below and above the kinematics'.
 std::string format_horizons(const Horizons& horizons);
+
+// The same for machines: "rows" with "simulation", "kinematics" and "constant_velocity" in m and
+// rad, "unfinished_runs".
+Json horizons_json(const Horizons& horizons);
 
 // Every window as a headed CSV table (docs/formats.md).
 std::string windows_csv(const Horizons& horizons);

@@ -48,7 +48,7 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   if (!command.out.empty()) {
     RETURN_IF_ERROR(command.outputs.write(command.out, windows_csv(horizons)));
   }
-  console.print(format_horizons(horizons));
+  console.result(format_horizons(horizons), horizons_json(horizons));
   return kExitDone;
 }
 

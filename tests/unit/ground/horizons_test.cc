@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/worker/ground_problem.h"
@@ -50,6 +51,9 @@ TEST(Horizons, ReportEveryWindowBesideTheMedians) {
   const std::string table = windows_csv(*horizons);
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), static_cast<long>(windows + 3));
   EXPECT_NE(table.find("\n0,,b,"), std::string::npos) << table;
+  const Json json = horizons_json(*horizons);
+  EXPECT_EQ(json["rows"][1]["horizon_s"], 0);
+  EXPECT_EQ(json["rows"][1]["kinematics"]["heading_rad"], horizons->rows[1].kinematics.heading_rad);
 }
 
 // A farm in which the robot falls over where a task holds the trial.
