@@ -109,7 +109,7 @@ Verdict judge_verdict(bool named, double explained_nats, const std::vector<Lefto
 std::string headline(const Diagnosis& diagnosis,
                      const EffectDiagnoses& effects = drive_effect_diagnoses());
 
-// "Trim the faster side's duty by 4.8 %, or paste the parameters below into your config.": the one
+// "Correct the commanded time by 40 ms, or paste the parameters below into your config.": the one
 // thing to do next.  Once next experiments are known.
 std::string action(const Diagnosis& diagnosis,
                    const EffectDiagnoses& effects = drive_effect_diagnoses());

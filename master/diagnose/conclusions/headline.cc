@@ -102,6 +102,12 @@ std::string action(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
     if (diagnosis.verdict == Verdict::kNone) {
       return "Use tuned.toml as it is; only more trials, or other ones, could show more.";
     }
+    const bool differs =
+        !diagnosis.checks.empty() && diagnosis.checks.front().covariate == "session";
+    if (diagnosis.verdict == Verdict::kUnknown && differs) {
+      return "Diagnose each session in a file of its own: what is missing in one is not in the "
+             "others.";
+    }
     if (diagnosis.where.empty()) return "Look at the worst drives below.";
     const Where& w = diagnosis.where.front();
     std::string motions = motions_of(w.command);

@@ -145,7 +145,10 @@ NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit, const F
     // The gain is over all that the readings show; of the gap it can close what the means left.
     const std::size_t trials = named.study().size();
     const double left = std::max(0.0, refit.floor - mean(refit.nested.back().scores));
-    const double per_trial = std::min(found.fit.gain / static_cast<double>(trials), left);
+    // Nothing foresees which way a reading was rounded: a grid closes none of it.
+    const bool is_grid = found.effect == "pose_quantisation";
+    const double per_trial =
+        is_grid ? 0 : std::min(found.fit.gain / static_cast<double>(trials), left);
     effect.gap_after = -per_trial;
     gained.assign(trials, per_trial);
   } else {

@@ -9,9 +9,9 @@ extern const EffectDiagnosis kMotorAsymmetry = {
     .model_error = 0.04,
     .phrases = {"The right side runs faster than the left by %1",
                 {{"ratio", 100, " %"}},
-                "Trim the faster side's duty by %1",
+                "Even out the duties of the two sides, which are %1 apart",
                 "The right side runs %1 faster than the left",
-                "The left side runs %1 faster than the right"},
+                "The right side runs %1 slower than the left"},
 };
 
 extern const EffectDiagnosis kMotorDeadband = {

@@ -240,7 +240,7 @@ TEST(Findings, ReportEffectsInPlainUnits) {
   slower.name = "motor_asymmetry";
   slower.parameters = {{"ratio", -0.067, -0.07, -0.06, "-"}};
   EXPECT_EQ(effect_sentence(slower, drive_effect_diagnoses()),
-            "The left side runs 6.7 % (6 to 7) faster than the right.");
+            "The right side runs 6.7 % (6 to 7) slower than the left.");
   NamedEffect strange;
   strange.name = "moon_phase";
   strange.parameters = {{"pull", 2, 1, 3, "N"}};
@@ -324,6 +324,8 @@ TEST(Findings, AHeadlineIsALineAndAnAction) {
   d.verdict = Verdict::kUnknown;
   d.where = {{"forward", "x", "trend", "time", 1, 1, 0, "..."}};
   EXPECT_NE(action(d).find("how forward drives depend on time"), std::string::npos) << action(d);
+  d.checks = {{"session", -40, 100}, {"place", -9, 20}};
+  EXPECT_NE(action(d).find("each session in a file"), std::string::npos) << action(d);
   for (const Effect& effect : srv1_effects()) {
     NamedEffect e;
     e.name = effect.name;
