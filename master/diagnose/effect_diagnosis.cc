@@ -88,7 +88,9 @@ IntervalSides interval_sides(const Study& study, const ParameterTable& table, st
   const double searched = effect.search_error == nullptr ? 0 : effect.search_error(p, value, gain);
   const double open = effect.ambiguity == nullptr ? 0 : effect.ambiguity(study, p, at);
   const double rest = kNormal90 * std::hypot(fitted, searched, open);
-  const IntervalSides model = model_error(effect, p, value);
+  // A place is no size: how far it is from the world's origin makes it no less sure.
+  const bool is_place = place_of(*study.subject->effects, p) != nullptr;
+  const IntervalSides model = is_place ? IntervalSides() : model_error(effect, p, value);
   return {std::hypot(rest, model.below), std::hypot(rest, model.above)};
 }
 

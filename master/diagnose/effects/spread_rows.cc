@@ -6,6 +6,7 @@
 #include "common/base/ranges.h"
 #include "common/effects/catalogue.h"
 #include "common/math/laws.h"
+#include "common/random/stream.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/evidence/slip.h"
@@ -14,6 +15,8 @@
 
 namespace gapfarm {
 namespace {
+
+constexpr std::size_t kFewestInPlace = 4;  // outliers
 
 SlipFit slip_of(const SpreadFit& fit) {
   return {fit.gain, fit.estimates[0].value, fit.estimates[1].value, *fit.noise};
@@ -30,17 +33,60 @@ double mean_loss(const Study& study, const SlipFit& slip) {
   return std::clamp(slip.probability * most * slip.loss * most / 2, 0.0, 0.5);
 }
 
-// Whether most outlier trials end nowhere near where a slip would have led them.
-bool are_other_outliers(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
-                        const SlipFit& slip, const std::vector<bool>& informative) {
+// Mean square of how far places lie from their middle, along x, y and both.
+Eigen::Vector3d scatter_about_middle(const std::vector<Eigen::Vector2d>& places) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero(), squares = sum;
+  for (const Eigen::Vector2d& at : places) sum += at, squares += at.cwiseAbs2();
+  const auto n = static_cast<double>(places.size());
+  const Eigen::Vector2d scatter = squares / n - (sum / n).cwiseAbs2();
+  return {scatter.x(), scatter.y(), scatter.sum()};
+}
+
+// Whether these trials begin, or go through, so much nearer to one another, or to one line along an
+// axis, than as many of all that no draw of theirs does.
+bool are_in_one_place(const std::vector<Eigen::Vector2d>& all,
+                      const std::vector<std::size_t>& some) {
+  constexpr int kPlacesDrawn = 2000;
+  const auto scatter_of_these = [&](auto pick) {
+    return scatter_about_middle(mapped(some, [&](std::size_t i) { return all[pick(i)]; }));
+  };
+  const Eigen::Vector3d own = scatter_of_these([](std::size_t i) { return i; });
+  Eigen::Array<bool, 3, 1> nearest = Eigen::Array<bool, 3, 1>::Constant(true);
+  Stream stream({0, Purpose::kStatistics, 5, 0, 0});
+  for (int k = 0; k < kPlacesDrawn; ++k) {
+    nearest = nearest && own.array() < scatter_of_these([&](std::size_t) {
+                                         return stream.below(all.size());
+                                       }).array();
+  }
+  return nearest.any();
+}
+
+// Why outlier trials are no slips; empty: they may be.
+std::string odd_outliers(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                         const SlipFit& slip, const std::vector<bool>& informative) {
   const std::vector<SlipTrial> judged =
       trials_with_slips(study.trials, residuals, slip, slip.probability * slip.loss / 2, 0);
-  std::size_t as_slips = 0, otherwise = 0;
+  std::vector<std::size_t> outliers;
+  std::size_t as_slips = 0;
   for (std::size_t i = 0; i < judged.size(); ++i) {
     if (!informative[i] || judged[i].squared < kFarSquared) continue;
-    ++(judged[i].nearest < kFarSquared ? as_slips : otherwise);
+    outliers.push_back(i);
+    as_slips += judged[i].nearest < kFarSquared ? 1 : 0;
   }
-  return otherwise > as_slips;
+  if (2 * as_slips < outliers.size()) {
+    return "Single drives are outliers, most of them to where no slip would have led: nothing "
+           "explains them that was looked for.";
+  }
+  const auto starts = mapped(
+      study.trials, [](const ResidualTrial& t) { return Eigen::Vector2d(t.X_WS.x, t.X_WS.y); });
+  const auto halfway = mapped(study.trials, [](const ResidualTrial& t) {
+    return Eigen::Vector2d((t.X_WS.x + t.X_WE.x) / 2, (t.X_WS.y + t.X_WE.y) / 2);
+  });
+  const bool here = outliers.size() >= kFewestInPlace &&
+                    (are_in_one_place(starts, outliers) || are_in_one_place(halfway, outliers));
+  return here ? "Single drives are outliers, and these are in one place, or along one line: "
+                "something lies there, which nothing that was looked for explains."
+              : "";
 }
 
 SpreadFit fit_slips(const Study& study, const std::vector<Eigen::Vector3d>& residuals, double) {
@@ -52,11 +98,7 @@ SpreadFit fit_slips(const Study& study, const std::vector<Eigen::Vector3d>& resi
                 {{"probability", p, 0.6 * p, std::min(1.0, 1.6 * p), "-"},
                  {"loss", loss, 0.7 * loss, std::min(1.0, 1.4 * loss), "-"}}};
   fit.noise = slip.noise;
-  if (slip.gain >= kLeastSlipGain && are_other_outliers(study, residuals, slip, informative)) {
-    fit.odd =
-        "Single drives are outliers, most of them to where no slip would have led: nothing "
-        "explains them that was looked for.";
-  }
+  if (slip.gain >= kLeastSlipGain) fit.odd = odd_outliers(study, residuals, slip, informative);
   return fit;
 }
 

@@ -9,7 +9,9 @@
 
 #include "common/math/statistics.h"
 #include "common/score/density.h"
+#include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/noise.h"
+#include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
 namespace gapfarm::slip_test {
@@ -182,6 +184,29 @@ TEST(ResidualKurtosis, ReportsTailsFromNone) {
   for (Eigen::Index i = 0; i < z.size(); i += 30) z[i] *= 5;
   EXPECT_GT(residual_kurtosis(z), 6);
   EXPECT_EQ(residual_kurtosis(Eigen::VectorXd::Zero(9)), 3);
+}
+
+// What a bump does to those that drive over it looks as a slip does.
+TEST(SlipSpread, OutliersInOnePlaceAreNoSlips) {
+  const Drawn drawn = draw(3, 0.02, 0.6);
+  const SpreadRow& slips = *effect_diagnosis("slip_events").spread;
+  Study study;
+  study.subject = diagnosis_subject(Problem{});
+  study.trials = drawn.trials;
+  study.use_noise(kTruth);
+  const SpreadFit scattered = slips.fit(study, drawn.residuals, 0.005);
+  EXPECT_GT(scattered.gain, kLeastSlipGain);
+  EXPECT_EQ(scattered.odd, "");
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    ResidualTrial& t = study.trials[i];
+    if ((study.whitener[i] * drawn.residuals[i]).norm() < 4) continue;
+    const double dx = 0.6 + 0.05 * std::cos(double(i)) - t.X_WS.x,
+                 dy = 0.5 + 0.05 * std::sin(double(i)) - t.X_WS.y;
+    for (Pose* X : {&t.X_WS, &t.X_WP, &t.X_WE}) *X = {X->x + dx, X->y + dy, X->theta};
+  }
+  const SpreadFit here = slips.fit(study, drawn.residuals, 0.005);
+  EXPECT_EQ(here.gain, scattered.gain);
+  EXPECT_NE(here.odd.find("in one place"), std::string::npos) << here.odd;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/diagnose.h"
+#include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/result/diagnosis_json.h"
@@ -235,6 +236,23 @@ TEST(HeldOutError, ATrialOnASeamStaysWhereItsFitHasIt) {
   EXPECT_LT(steps::held_out_error(nested, each).position_mm, 10.01);
   nested.fit.jacobian(0, 0) = 200;  // a slope like others: its miss counts
   EXPECT_NEAR(held_out_residuals(nested.study, nested.fit, each)[0].x(), -0.01, 1e-6);
+}
+
+// A lens about a middle 5 m from the world's origin is known as well as one about the origin; its
+// strength is off by a share of itself.
+TEST(IntervalSides, OfAPlaceAreTheSameWhereverTheWorldBegins) {
+  Study study;
+  study.subject = diagnosis_subject(Problem{});
+  const ParameterTable& table = srv1_table();
+  const std::size_t k1 = table.row("camera_distortion.k1"), x = table.row("camera_distortion.x");
+  const auto half = [&](std::size_t row, double value) {
+    const IntervalSides sides =
+        interval_sides(study, table, row, {{row, value}}, /*gain=*/50, /*fitted=*/0.01);
+    EXPECT_GT(sides.above, 0);
+    return sides.above;
+  };
+  EXPECT_EQ(half(x, 5), half(x, 0));
+  EXPECT_GT(half(k1, 0.5), half(k1, 0.1));
 }
 
 TEST(Confidence, GrowsWithTheGainAndIsNeverSure) {
