@@ -3,10 +3,12 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/base/text.h"
 #include "common/trials/context.h"
 #include "master/io/log_checks/log_checks.h"
 
@@ -14,6 +16,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kMostImpossible = 0.05;  // of the trials
+constexpr std::size_t kMostRowsListed = 8;
 constexpr double kTimesAsFar = 2;
 // By chance some drives lead back to where the one before began: one in hundreds, of any log.
 constexpr std::size_t kFewestFollowing = 8, kTimesAsMany = 5;
@@ -54,12 +57,15 @@ std::vector<std::size_t> too_fast_trials(const Problem& problem) {
 void note_rows(const Problem& problem, const std::vector<std::size_t>& rows, const char* name,
                const std::string& what, std::vector<SanityFinding>* findings) {
   if (rows.empty()) return;
-  const Trial& first = problem.log.trials[rows.front()];
+  const auto listed = std::span(rows).first(std::min(rows.size(), kMostRowsListed));
+  const std::string which = joined(listed, "; ", [&](std::size_t row) {
+    const Trial& trial = problem.log.trials[row];
+    return "session " + trial.session + ", trial " + std::to_string(trial.trial);
+  });
   findings->push_back({name,
                        std::to_string(rows.size()) + " of " +
-                           std::to_string(problem.log.trials.size()) + " trials " + what +
-                           " (the first: session " + first.session + ", trial " +
-                           std::to_string(first.trial) + ").",
+                           std::to_string(problem.log.trials.size()) + " trials " + what + " (" +
+                           (listed.size() < rows.size() ? "the first: " : "") + which + ").",
                        "Look at these rows; a diagnosis leaves them out.", Severity::kNote});
 }
 
