@@ -308,15 +308,26 @@ double leftover_scale(const Regression& explained) {
 
 std::vector<Leftover> leftovers(const Regression& explained,
                                 const std::vector<CovariateBlock>& blocks) {
-  const double scale = leftover_scale(explained);
+  const double middle = leftover_scale(explained);
+  // A few that are far off would scatter all, and be what depends on something.
+  const double far = kOutlierDeviations * std::sqrt(middle);
+  Regression bounded = explained;
+  bounded.restart(explained.left().cwiseMax(-far).cwiseMin(far));
+  const Eigen::VectorXd z = studentised(bounded, 0.2);
+  const auto rows = static_cast<double>((z.array() != 0).count());
   std::vector<Leftover> all;
   for (const CovariateBlock& block : blocks) {
-    const Gain gain = block.expected > 0 ? explained.gain_beyond(block.columns, block.expected)
-                                         : explained.gain(block.columns);
+    const auto gain_of = [&](const Regression& of) {
+      return block.expected > 0 ? of.gain_beyond(block.columns, block.expected)
+                                : of.gain(block.columns);
+    };
+    const Gain gain = gain_of(bounded), whole = gain_of(explained);
     if (gain.dimensions == 0) continue;
-    const double p = chi_squared_above(gain.dimensions, gain.squares / scale);
+    // What it leaves scatters by its tails, too, which the middle does not know.
+    const double rest = (z.squaredNorm() - gain.squares) / std::max(1.0, rows - gain.dimensions);
+    const double p = chi_squared_above(gain.dimensions, gain.squares / std::max(middle, rest));
     all.push_back({block.name, std::log10(std::max(p, 1e-300)),
-                   std::max(0.0, (gain.squares - gain.dimensions * scale) / 2)});
+                   std::max(0.0, (whole.squares - whole.dimensions * middle) / 2)});
   }
   std::ranges::stable_sort(all, {}, &Leftover::log10_p);
   return all;
