@@ -332,7 +332,7 @@ class GroundReport {
       d_.headline =
           changes   ? (nothing ? "Nothing changed by more than a robot does from log to log."
                                : "Something changed that nothing of the catalogue explains alone.")
-          : nothing ? nothing_wrong(robot_)
+          : nothing ? (search_.clocks.empty() ? nothing_wrong(robot_) : search_.clocks)
           : something_is_left(figures_)
               ? "Something is wrong that nothing of the catalogue explains alone."
               : "Nothing is significantly wrong, but these runs do not exclude it.";
