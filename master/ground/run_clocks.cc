@@ -119,9 +119,10 @@ struct ClockShift {
   double first_s = 0, rate = 0;
 };
 
-// The clock that fits a run best beside values that are known, its rate included.
+// The clock that fits a run, whose commands begin at `first_s`, best beside values that are known,
+// its rate included.
 ClockShift shift_of(const WindowFitter& fitter, const GroundQuestion& question,
-                    const WindowFit& fit, const RunClock& odd) {
+                    const WindowFit& fit, const RunClock& odd, double first_s) {
   std::vector<FitRow> rows = fit.rows;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     rows[k].row.nominal = fit.values[static_cast<Eigen::Index>(k)];
@@ -134,11 +135,13 @@ ClockShift shift_of(const WindowFitter& fitter, const GroundQuestion& question,
   const auto drifts = find_by(question.catalogue, "clock_drift", &GroundHypothesis::name);
   if (drifts != nullptr) rows = with_freed(std::move(rows), *drifts, &values);
   const WindowFit own = fitter.fit(rows, all_but(fitter.windows(), odd.run), values);
-  const double rate = drifts == nullptr ? 0 : own.values[own.values.size() - 1];
-  // The model's drift begins with the first run.
-  const double since_s = fitter.windows().runs[odd.run].commands.front().t_s -
-                         fitter.windows().runs.front().commands.front().t_s;
-  return {own.values[delay] - fit.values[delay] + rate * since_s, rate};
+  const double late_s = own.values[delay] - fit.values[delay];
+  if (drifts == nullptr) return {late_s};
+  const double rate = own.values[row_index(own.rows, drifts->freed.front().name)];
+  // The model's drift begins with the first command of all (KinematicPaths).
+  const auto first = std::ranges::find_if(
+      fitter.windows().runs, [](const CommandedRun& run) { return !run.commands.empty(); });
+  return {late_s + rate * (first_s - first->commands.front().t_s), rate};
 }
 
 }  // namespace
@@ -156,10 +159,10 @@ Status put_on_one_clock(const GroundRobot& robot, const GroundQuestion& question
   const WindowFit others = fitter.fit(all_free(search->fit.rows), held_out, search->fit.values);
   const auto odd = odd_clock(fitter, others);
   if (!odd || odd->run != by_file->run) return {};
-  const ClockShift shift = shift_of(fitter, question, others, *odd);
   LoggedRun& run = search->log.runs[odd->run];
-  const double first_s = run.commands.front().t_s;
-  const double last_s = run.commands.back().t_s;
+  if (run.commands.empty()) return {};
+  const double first_s = run.commands.front().t_s, last_s = run.commands.back().t_s;
+  const ClockShift shift = shift_of(fitter, question, others, *odd, first_s);
   for (CommandRow& row : run.commands) row.t_s += shift.first_s + shift.rate * (row.t_s - first_s);
   search->clocks = fmt::format(
       "The runs' clocks are apart: commands of run {} were moved by {:+.2f} s, its last by {:+.2f} "
