@@ -40,15 +40,12 @@ void FloorParts::put(std::string_view name, double value) {
   if (row == nullptr) return;
   to.*row->value = value;
   to.beyond = {std::cos(to.edge_rad), std::sin(to.edge_rad)};
-}
-
-bool FloorParts::even() const {
-  return parts_.edge_ratio == 1 && parts_.patch_ratio == 1 && known_.edge_ratio == 1 &&
-         known_.patch_ratio == 1;
+  even_ = parts_.edge_ratio == 1 && parts_.patch_ratio == 1 && known_.edge_ratio == 1 &&
+          known_.patch_ratio == 1;
 }
 
 double FloorParts::under(const RobotPlace* at, const RobotWheel& wheel) const {
-  if (at == nullptr || even()) return 1;
+  if (at == nullptr || even_) return 1;
   const Eigen::Vector2d left(-at->ahead[1], at->ahead[0]);
   const Eigen::Vector2d place =
       at->place_m + wheel.x_m.value_or(0) * at->ahead + wheel.y_m.value_or(0) * left - origin_m_;
@@ -66,6 +63,7 @@ double FloorParts::under(const RobotPlace* at, const RobotWheel& wheel) const {
 }
 
 double FloorParts::under_wheels(const RobotPlace* at, const GroundRobot& robot, bool driven) const {
+  if (at == nullptr || even_) return 1;
   double sum = 0, counted = 0;
   for (const RobotWheel& wheel : robot.wheels) {
     if (driven && !wheel.driven) continue;

@@ -39,7 +39,7 @@ class FloorParts {
   // Takes it; others are none of its business.
   void put(std::string_view name, double value);
 
-  bool even() const;
+  bool even() const { return even_; }
   // Under a wheel of a robot that stands there; 1 where nobody knows where that is.
   double under(const RobotPlace* at, const RobotWheel& wheel) const;
   // The mean of all wheels, or of the driven ones.
@@ -59,6 +59,7 @@ class FloorParts {
 
   Eigen::Vector2d origin_m_;
   Parts parts_, known_;
+  bool even_ = true;
 };
 
 // Traction 1: e1 (v + w x p) = s of every driven wheel, in the least-squares sense, e1 being the
@@ -164,11 +165,13 @@ class KinematicBody {
 // Runs and their windows as kinematics are asked about them: many times, at other values.
 class KinematicPaths {
  public:
-  // Both outlive it.
-  KinematicPaths(std::span<const CommandedRun> runs, std::span<const Trial> trials);
+  // All outlive it.
+  KinematicPaths(const GroundRobot& robot, std::span<const CommandedRun> runs,
+                 std::span<const Trial> trials);
 
   // The end of every window, as kinematic_ends() has it.  Not by several threads at a time.
-  std::vector<Pose> ends(const GroundRobot& robot, const Kinematics& kinematics) const;
+  // `stays`: others that are asked for next drive alike, but for how their poses are seen.
+  std::vector<Pose> ends(const Kinematics& kinematics, bool stays = true) const;
 
  private:
   struct Path {
@@ -184,11 +187,15 @@ class KinematicPaths {
   RobotPlace marker(std::size_t run, double t_s) const;
   std::vector<Pose> poses(const KinematicBody& body, std::size_t run) const;
 
+  const GroundRobot& robot_;
   std::span<const CommandedRun> runs_;
   std::span<const Trial> trials_;
   double began_s_ = 0;
   mutable std::vector<Path> paths_;
   std::vector<Ends> ends_;
+  // The last that stay: the values that move the robot, and the poses of every run.
+  mutable Kinematics driven_;
+  mutable std::vector<std::vector<Pose>> poses_;
 };
 
 }  // namespace gapfarm

@@ -62,10 +62,16 @@ struct Moving {
   }
 };
 
+// Values that change how poses are seen, and no motion unless it matters where the robot is.
+bool is_of_view(std::string_view name) {
+  return name.starts_with("marker_") || name == "pose_scale" || name == "aspect";
+}
+
 }  // namespace
 
-KinematicPaths::KinematicPaths(std::span<const CommandedRun> runs, std::span<const Trial> trials)
-    : runs_(runs), trials_(trials), paths_(runs.size()) {
+KinematicPaths::KinematicPaths(const GroundRobot& robot, std::span<const CommandedRun> runs,
+                               std::span<const Trial> trials)
+    : robot_(robot), runs_(runs), trials_(trials), paths_(runs.size()) {
   const auto first = std::ranges::find_if(runs, [](const auto& r) { return !r.commands.empty(); });
   if (first != runs.end()) began_s_ = first->commands.front().t_s;
   for (const Trial& trial : trials) {
@@ -150,12 +156,24 @@ std::vector<Pose> KinematicPaths::poses(const KinematicBody& body, std::size_t r
   return poses;
 }
 
-std::vector<Pose> KinematicPaths::ends(const GroundRobot& robot,
-                                       const Kinematics& kinematics) const {
-  const KinematicBody body(robot, kinematics);
+std::vector<Pose> KinematicPaths::ends(const Kinematics& kinematics, bool stays) const {
+  const KinematicBody body(robot_, kinematics);
   if (body.knows_place()) measure();
+  Kinematics driven;
+  for (std::size_t k = 0; k < kinematics.names.size(); ++k) {
+    const bool moves = body.knows_place() || !is_of_view(kinematics.names[k]);
+    if (moves) driven.add(kinematics.names[k], kinematics.values[static_cast<Eigen::Index>(k)]);
+  }
   std::vector<std::vector<Pose>> paths;
-  for (std::size_t i = 0; i < paths_.size(); ++i) paths.push_back(poses(body, i));
+  if (!poses_.empty() && driven.names == driven_.names && driven.values == driven_.values) {
+    paths = poses_;
+  } else {
+    for (std::size_t i = 0; i < paths_.size(); ++i) paths.push_back(poses(body, i));
+    if (stays) {
+      poses_ = paths;
+      driven_ = std::move(driven);
+    }
+  }
   const Pose& X_RM = body.robot().X_RM;
   const Pose X_MR = inverse(X_RM);
   std::vector<Pose> ends;
@@ -173,7 +191,7 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
                                  std::span<const Trial> trials, const Kinematics& kinematics) {
-  return KinematicPaths(runs, trials).ends(robot, kinematics);
+  return KinematicPaths(robot, runs, trials).ends(kinematics);
 }
 
 }  // namespace gapfarm

@@ -61,7 +61,7 @@ WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
                            const std::optional<GroundReference>& reference, FitMemo* memo)
     : robot_(robot),
       windows_(windows),
-      paths_(windows.runs, windows.trials),
+      paths_(robot, windows.runs, windows.trials),
       reference_(reference),
       memo_(memo) {
   if (memo != nullptr) question_ = question_of(robot, windows, reference);
@@ -126,7 +126,8 @@ Kinematics WindowFitter::kinematics(const std::vector<FitRow>& rows,
 std::vector<std::vector<Eigen::Vector3d>> WindowFitter::residuals(
     const std::vector<FitRow>& rows, const std::vector<Eigen::VectorXd>& points) const {
   const auto at = mapped(points, [&](const auto& values) { return kinematics(rows, values); });
-  const auto by_robot = [&](const Kinematics& k) { return paths_.ends(robot_, k); };
+  const bool stays = points.size() == 1;  // slopes about it come next
+  const auto by_robot = [&](const Kinematics& k) { return paths_.ends(k, stays); };
   const auto ends = windows_.simulated ? windows_.simulated(at) : mapped(at, by_robot);
   std::vector<std::vector<Eigen::Vector3d>> all;
   for (std::size_t k = 0; k < at.size(); ++k) all.push_back(residuals(at[k], ends[k]));

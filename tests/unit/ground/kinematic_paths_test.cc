@@ -18,7 +18,7 @@ Pose after_a_start(const GroundRobot& robot, double left_rad_s, double right_rad
   window.run = 0;
   window.t_s = 1;
   window.duration_s = 0.5;
-  return KinematicPaths({&run, 1}, {&window, 1}).ends(robot, at).front();
+  return KinematicPaths(robot, {&run, 1}, {&window, 1}).ends(at).front();
 }
 
 constexpr double kDriven_s = 0.5 - 0.0137;
@@ -51,7 +51,7 @@ TEST(KinematicPaths, ASteadyMotionIsAnArc) {
   window.run = 0;
   window.t_s = 0.31;
   window.duration_s = 4.7;
-  const Pose X = KinematicPaths({&run, 1}, {&window, 1}).ends(robot, off_by({"lag"}, {0})).front();
+  const Pose X = KinematicPaths(robot, {&run, 1}, {&window, 1}).ends(off_by({"lag"}, {0})).front();
   const Pose arc = exp(Twist(4.7 * Twist(0.05 * 4, 0, 0.05 * 4 / 0.3)));
   EXPECT_NEAR(X.x, arc.x, 1e-12);
   EXPECT_NEAR(X.y, arc.y, 1e-12);
@@ -70,7 +70,7 @@ TEST(KinematicPaths, TurnsAddSharesToWhatIsCommanded) {
     window.t_s = 0.5;
     window.duration_s = 1;
     const Kinematics at = off_by({"lag", name}, {0, share});
-    return log(KinematicPaths({&run, 1}, {&window, 1}).ends(robot, at).front());
+    return log(KinematicPaths(robot, {&run, 1}, {&window, 1}).ends(at).front());
   };
   const auto expect = [](const Twist& twist, double ahead, double turn) {
     EXPECT_NEAR(twist[0], ahead, 1e-12);
