@@ -23,9 +23,7 @@ struct Candidate {
   Offer offer;
   WindowFit fit = {};
   WindowFit held_out = {};
-  WindowFit before = {};  // that it is compared with
-  HeldOutGain held_out_gain = {};
-  bool moved = false;  // both with all other values moved within their tolerances
+  HeldOutGain held_out_gain = {};  // over what is named
   bool may_be_named = false;
   bool competes = false;  // and is no trace of the names before it
 
@@ -76,22 +74,9 @@ void predict_held_out(const WindowFitter& fitter, const GroundWork& work,
                       const GroundSearch& search, Candidate* candidate) {
   std::vector<std::size_t> hypotheses = mapped(search.steps, &GroundStep::chosen);
   hypotheses.push_back(candidate->offer.hypothesis);
-  const auto measure = [&](Candidate& c) {
-    c.held_out = c.moved ? fit_held_out(fitter, c.fit.rows, c.fit.values)
-                         : held_out_with(fitter, search, hypotheses, c.fit);
-    c.held_out_gain = held_out_gain(fitter.windows(), c.held_out, c.before, work.seed);
-  };
-  candidate->before = search.chain.back();
-  candidate->moved = search.moved;
-  measure(*candidate);
-  const bool first = candidate->offer.hypothesis == search.offers.back().front().hypothesis;
-  if (search.moved || !first || may_be_named(candidate->held_out_gain)) return;
-  // What gains most may show only once the others have moved a little.
-  Candidate beside = *candidate;
-  beside.moved = true;
-  beside.before = fit_held_out(fitter, search.fit.rows, search.fit.values);
-  measure(beside);
-  if (may_be_named(beside.held_out_gain)) *candidate = std::move(beside);
+  candidate->held_out = held_out_with(fitter, search, hypotheses, candidate->fit);
+  candidate->held_out_gain =
+      held_out_gain(fitter.windows(), candidate->held_out, search.chain.back(), work.seed);
 }
 
 // What a candidate gains, held out, in the windows where it is no trace of the names before it.
@@ -105,11 +90,11 @@ HeldOutGain gain_beyond_traces(const WindowSet& windows, const GroundWork& work,
   };
   WindowFit counted = candidate.held_out;
   for (std::size_t i = 0; i < counted.nats.size(); ++i) {
-    if (moved(candidate.before, candidate.held_out, i) < kTraceShare * moved(file, named, i)) {
-      counted.nats[i] = candidate.before.nats[i];
+    if (moved(named, candidate.held_out, i) < kTraceShare * moved(file, named, i)) {
+      counted.nats[i] = named.nats[i];
     }
   }
-  return held_out_gain(windows, counted, candidate.before, work.seed);
+  return held_out_gain(windows, counted, named, work.seed);
 }
 
 void keep_if_best(GroundSearch* search, WindowFit held_out, std::string what) {
@@ -122,8 +107,7 @@ void keep_if_best(GroundSearch* search, WindowFit held_out, std::string what) {
 void name_candidate(const WindowSet& windows, const GroundWork& work,
                     const std::vector<Candidate>& candidates, const Candidate& chosen,
                     GroundSearch* search) {
-  GroundStep step{
-      chosen.offer.hypothesis, chosen.offer.gain, chosen.held_out_gain, chosen.before, {}};
+  GroundStep step{chosen.offer.hypothesis, chosen.offer.gain, chosen.held_out_gain, {}};
   const auto add = [&](std::size_t hypothesis) {
     auto& alike = step.not_distinguished;
     const bool there = contains(alike, hypothesis);
@@ -142,7 +126,6 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
   search->steps.push_back(std::move(step));
   search->fit = chosen.fit;
   search->chain.push_back(chosen.held_out);
-  search->moved = chosen.moved;
 }
 
 bool frees_part_of(const GroundHypothesis& part, const GroundHypothesis& whole) {
@@ -173,7 +156,7 @@ const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
   const Candidate* likeliest = &chosen;
   for (const Candidate& c : candidates) {
     if (c.offer.gain < likeliest->offer.gain + kNotDistinguished) continue;
-    if (!c.may_be_named || c.moved != chosen.moved) continue;
+    if (!c.may_be_named) continue;
     const HeldOutGain over = held_out_gain(windows, chosen.held_out, c.held_out, work.seed);
     if (over.lo <= 0) likeliest = &c;
   }
@@ -210,7 +193,6 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     const std::vector<FitRow> alone_rows = with_freed(rows_named, hypothesis, &values);
     const WindowFit alone = fitter.fit(alone_rows, {}, values);
     c.held_out = fit_held_out(fitter, alone.rows, alone.values);
-    c.before = named;
     c.held_out_gain = gain(c.held_out, named);
     c.offer.gain = alone.objective - as_it_stands;
     const bool all = gain(moved, c.held_out).hi < kToleratedGap;

@@ -41,10 +41,7 @@ struct Offer {
 struct GroundStep {
   std::size_t chosen = 0;
   double gain = 0;       // nats over all windows
-  HeldOutGain held_out;  // over `before`
-  // Held out: what it is compared with. What was named before, or that with all values moved within
-  // their tolerances, where only then it shows.
-  WindowFit before;
+  HeldOutGain held_out;  // over what was named before
   std::vector<std::size_t> not_distinguished;
 };
 
@@ -100,7 +97,6 @@ struct GroundNames {
   // Predictions of stretches that were held out: the file as it is, with the first thing that was
   // chosen, with the first two, ...
   std::vector<WindowFit> chain;
-  bool moved = false;  // the last of the chain: with all other values moved within tolerances
 };
 
 struct GroundSearch : GroundBasis, GroundNames {

@@ -23,7 +23,6 @@ GroundNames with_names(const WindowFitter& fitter, const GroundWork& work,
                        const GroundSearch& search, const GroundNames& unnamed,
                        const std::vector<GroundStep>& steps) {
   GroundNames again = unnamed;
-  again.moved = search.moved;
   std::vector<std::size_t> hypotheses;
   for (GroundStep step : steps) {
     const GroundHypothesis& hypothesis = search.catalogue[step.chosen];
@@ -32,13 +31,10 @@ GroundNames with_names(const WindowFitter& fitter, const GroundWork& work,
     const std::vector<FitRow> rows = with_freed(again.fit.rows, hypothesis, &values);
     take_values(search.fit, rows, &values);
     WindowFit fit = fitter.fit(rows, {}, values);
-    const bool moved = again.moved && hypotheses.size() == steps.size();
     step.gain = gain_of(fitter, hypothesis, fit, again.fit);
-    step.before =
-        moved ? fit_held_out(fitter, again.fit.rows, again.fit.values) : again.chain.back();
-    again.chain.push_back(moved ? fit_held_out(fitter, rows, fit.values)
-                                : held_out_with(fitter, search, hypotheses, fit));
-    step.held_out = held_out_gain(search.windows, again.chain.back(), step.before, work.seed);
+    WindowFit predicted = held_out_with(fitter, search, hypotheses, fit);
+    step.held_out = held_out_gain(search.windows, predicted, again.chain.back(), work.seed);
+    again.chain.push_back(std::move(predicted));
     again.steps.push_back(std::move(step));
     again.fit = std::move(fit);
   }

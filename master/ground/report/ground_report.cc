@@ -91,7 +91,7 @@ class GroundReport {
       }
     }
     const double floor = mean(search_.best.nats);
-    const WindowFit &before = step.before, &after = search_.chain[place + 1];
+    const WindowFit &before = search_.chain[place], &after = search_.chain[place + 1];
     effect.gap_before = (floor - mean(before.nats)) / search_.windows.counts;
     effect.gap_after = (floor - mean(after.nats)) / search_.windows.counts;
     effect.position_mm_before = rms_mm(before);

@@ -29,7 +29,6 @@ void name_first(const std::string& name, const GroundNames& unnamed, const Windo
     const auto rows = with_freed(names.fit.rows, search->catalogue[step.chosen], &values);
     names.fit = fitter.fit(rows, {}, values);
     hypotheses.push_back(step.chosen);
-    step.before = names.chain.back();
     names.chain.push_back(held_out_with(fitter, *search, hypotheses, names.fit));
     step.held_out = held_out_gain(search->windows, names.chain.back(), names.chain.front(), 1);
   }
