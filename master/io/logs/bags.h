@@ -43,6 +43,8 @@ struct LogTable {
   }
   // As the file states it, without brackets; empty where it does not.
   std::string unit_of(std::string_view name) const;
+  // Of a column, those that are there; empty also where there is none of that name.
+  std::vector<double> numbers(std::string_view name) const;
 };
 
 // What one file held.

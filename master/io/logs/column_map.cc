@@ -162,6 +162,20 @@ class MapReader {
     errors_.add(section.table().source().begin, section.name() + text);
   }
 
+  // Other rows have channels of any name.
+  void check_pose_role(const toml::node& node, const std::string& role) {
+    static const std::vector<std::string> kRoles = [] {
+      std::vector<std::string> all = {"t", "dt", "x", "y", "z", "theta", "qx", "qy", "qz", "qw"};
+      for (const auto* noise : {&kCovarianceColumns, &kDeviationColumns}) {
+        all.insert(all.end(), noise->begin(), noise->end());
+      }
+      return all;
+    }();
+    if (contains(kRoles, role)) return;
+    errors_.add(node,
+                "unknown key " + quoted_word(role) + " in [poses]" + suggestion(role, kRoles));
+  }
+
   void check_times(const TomlSection& section, TableMap& map) {
     for (MappedColumn& c : map.columns) {
       if (c.role != "dt" || map.find("t") != nullptr) continue;
@@ -202,6 +216,7 @@ class MapReader {
   void read_column(TomlSection& section, const char* name, const std::string& role,
                    const toml::node& node, TableMap& map) {
     MappedColumn column{role, "", ""};
+    if (name == std::string_view("poses")) check_pose_role(node, role);
     if (const auto* word = node.as_string()) {
       section.find(role);
       column.column = word->get();

@@ -28,8 +28,7 @@ struct Role {
 const Aliases kTime = {
     "t",    "time",   "*.header.stamp",       "timestamp", "stamp",   "%time", "__time", "time_s",
     "secs", "*.time", "elapsed.time.sensors", "dt",        "delta_t", "period"};
-const Aliases kRun = {"run", "step", "trial", "take"};
-const Aliases kKeep = {"pose_new"};
+const Aliases kRun = {"run", "step", "trial", "take"}, kKeep = {"pose_new"};
 
 const std::vector<Role> kPoseRoles = {
     {"x",
@@ -45,14 +44,20 @@ const std::vector<Role> kPoseRoles = {
     {"qz", {"qz", "*.orientation.z", "*.rotation.z"}},
     {"qw", {"qw", "*.orientation.w", "*.rotation.w"}}};
 
+const Aliases kAhead = {"v",        "cmd_v", "v_cmd", "*.cmd_vel.linear.x", "*.twist.linear.x",
+                        "linear.x", "vx"};
+const Aliases kTurning = {
+    "w", "omega", "cmd_w", "w_cmd", "*.cmd_vel.angular.z", "*.twist.angular.z", "angular.z", "wz"};
+
 // Sets of channels that go together; the first that is whole counts.
 const std::vector<std::vector<Role>> kCommandRoles = {
     {{"left", {"cmd_left", "command_left", "left_cmd", "left"}},
      {"right", {"cmd_right", "command_right", "right_cmd", "right"}}},
     {{"throttle", {"throttle", "*.throttle"}}, {"steering", {"steering", "*.steering"}}},
-    {{"v", {"v", "cmd_v", "v_cmd", "*.cmd_vel.linear.x", "*.twist.linear.x", "linear.x"}},
-     {"omega",
-      {"w", "omega", "cmd_w", "w_cmd", "*.cmd_vel.angular.z", "*.twist.angular.z", "angular.z"}}},
+    {{"v", kAhead},
+     {"vy", {"vy", "*.cmd_vel.linear.y", "*.twist.linear.y", "linear.y"}},
+     {"omega", kTurning}},
+    {{"v", kAhead}, {"omega", kTurning}},
     {{"speed", {"drive.speed", "speed", "cmd_speed"}},
      {"steering", {"drive.steering_angle", "steering_angle", "cmd_steering"}}},
     {{"left", {"vl", "v_left"}}, {"right", {"vr", "v_right"}}},
@@ -62,13 +67,7 @@ const std::vector<Role> kWheelRoles = {
     {"left", {"wheel_left", "left_wheel", "enc_left", "odol"}},
     {"right", {"wheel_right", "right_wheel", "enc_right", "odor"}}};
 
-// The numbers of a column that are there.
-std::vector<double> numbers(const LogTable& table, const std::string& column) {
-  const auto at = table.find(column);
-  if (!at) return {};
-  return filtered(mapped(indices(table.rows()), [&](std::size_t r) { return table.at(r, *at); }),
-                  [](double value) { return std::isfinite(value); });
-}
+std::string whole(double number) { return std::to_string(static_cast<long>(number)); }
 
 double greatest(const std::vector<double>& values) {
   return max_of(values, [](double value) { return std::abs(value); });
@@ -96,7 +95,7 @@ class Guess {
     const std::string stamp = column_of(table, {"*.header.stamp"});
     const std::string time = column_of(table, kTime);
     if (stamp.empty()) return time;
-    const auto stamps = numbers(table, stamp), times = numbers(table, "t");
+    const auto stamps = table.numbers(stamp), times = table.numbers("t");
     if (table.topic.empty()) {
       const bool set = !stamps.empty() && greatest(stamps) > 0;
       return set || time.empty() ? stamp : time;
@@ -138,7 +137,7 @@ class Guess {
     to.columns.push_back({"t", time, time_unit(table, time)});
     const std::string& unit = to.columns.back().unit;
     to.intervals =
-        are_durations(numbers(table, time), unit_factor(unit.empty() ? table.unit_of(time) : unit));
+        are_durations(table.numbers(time), unit_factor(unit.empty() ? table.unit_of(time) : unit));
   }
 
   static void add_columns(const LogTable& table, const std::vector<Role>& roles, TableMap& to) {
@@ -212,12 +211,20 @@ class Guess {
     }
   }
 
+  // A Twist has a speed aside whether the robot can go there or not, and vx beside poses is as
+  // likely what was measured.
+  static bool is_no_command(const LogTable& table, const TableMap& found) {
+    const MappedColumn *aside = found.find("vy"), *ahead = found.find("v");
+    return (aside != nullptr && greatest(table.numbers(aside->column)) == 0) ||
+           (ahead != nullptr && ahead->column == "vx" && !column_of(table, {"x"}).empty());
+  }
+
   void guess_commands(const LogTable& table, const std::string& time) {
     for (const std::vector<Role>& set : kCommandRoles) {
       TableMap found;
       start(table, time, found);
       add_columns(table, set, found);
-      if (found.columns.size() != set.size() + 1) continue;
+      if (found.columns.size() != set.size() + 1 || is_no_command(table, found)) continue;
       for (MappedColumn& c : found.columns) {
         if (c.role == "t" || stated(table, c.column)) continue;
         c.unit = unit_in_name(c.column);
@@ -233,10 +240,9 @@ class Guess {
 
   // A joint's name as a key of the map: plain letters, each once, none of the map's own.
   static std::string role_of(const std::string& joint, const TableMap& taken) {
-    std::string role;
-    for (const char c : joint) {
-      role += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
-    }
+    std::string role = joint;
+    const auto odd = [](unsigned char c) { return std::isalnum(c) == 0 && c != '-'; };
+    std::ranges::replace_if(role, odd, '_');
     for (const char* own : {"", "source", "session", "run", "keep", "up", "wheel_radius"}) {
       if (role == own) role += "_joint";
     }
@@ -300,8 +306,6 @@ class Guess {
     return !table.unit_of(column).empty();
   }
 
-  static std::string whole(double number) { return std::to_string(static_cast<long>(number)); }
-
   std::string taken_as(const std::string& unit, const std::string& why) {
     std::string note = why + ": taken as " + unit;
     if (!contains(map_.notes, note)) map_.notes.push_back(std::move(note));
@@ -311,10 +315,10 @@ class Guess {
   // Clocks count seconds since 1970 or since something; a day has 86,400.
   std::string time_unit(const LogTable& table, const std::string& column) {
     if (stated(table, column)) return "";
-    if (has_word(column, "ns")) return "ns";
-    if (has_word(column, "us")) return "us";
-    if (has_word(column, "ms")) return "ms";
-    const std::vector<double> times = numbers(table, column);
+    for (const char* unit : {"ns", "us", "ms"}) {
+      if (has_word(column, unit)) return unit;
+    }
+    const std::vector<double> times = table.numbers(column);
     const double most = greatest(times);
     if (most > 1e11) return most > 1e17 ? "ns" : most > 1e14 ? "us" : "ms";
     std::vector<double> steps;
@@ -324,8 +328,10 @@ class Guess {
     }
     const double step = steps.empty() ? 0 : median(steps);
     if (step < kFewestMs) return "s";
-    const char* unit = step < kFewestUs ? "ms" : step < kFewestNs ? "us" : "ns";
-    return taken_as(unit, column + " grows by " + whole(step) + " a row");
+    return taken_as(step < kFewestUs   ? "ms"
+                    : step < kFewestNs ? "us"
+                                       : "ns",
+                    column + " grows by " + whole(step) + " a row");
   }
 
   std::string length_unit(const LogTable& table, const TableMap& found) {
@@ -345,8 +351,7 @@ class Guess {
       const double dx = std::abs(table.at(r, *xi) - table.at(r - 1, *xi));
       if (dt > 0 && dx > 0) speeds.push_back(dx / dt);
     }
-    if (speeds.size() < 2) return "m";
-    const double middle = median(speeds);
+    const double middle = speeds.size() < 2 ? 0 : median(speeds);
     if (middle < kFastest_m_s) return "m";
     return taken_as("mm", "x changes by " + whole(middle) + " a second, half of the time by more");
   }
@@ -356,7 +361,7 @@ class Guess {
     if (stated(table, column)) return "";
     if (has_word(column, "mrad")) return "mrad";
     if (has_word(column, "deg") || column.find("_deg") != column.npos) return "deg";
-    const std::vector<double> values = numbers(table, column);
+    const std::vector<double> values = table.numbers(column);
     double jump = 0;
     for (std::size_t i = 1; i < values.size(); ++i) {
       jump = std::max(jump, std::abs(values[i] - values[i - 1]));
@@ -371,7 +376,7 @@ class Guess {
   static std::string rate_unit(const LogTable& table, const std::string& column) {
     if (stated(table, column)) return "";
     if (column.find("deg") != column.npos) return "deg/s";
-    return greatest(numbers(table, column)) > 60 ? "deg/s" : "rad/s";
+    return greatest(table.numbers(column)) > 60 ? "deg/s" : "rad/s";
   }
 
   static std::string rim_unit(const LogTable& table, const std::string& column) {
@@ -380,8 +385,7 @@ class Guess {
     const std::string name = plain_name(column);
     const bool speed = name == "vl" || name == "vr" || name == "v_left" || name == "v_right" ||
                        name.find("speed") != name.npos;
-    if (speed) return "m/s";
-    return "rad/s";
+    return speed ? "m/s" : "rad/s";
   }
 
   const std::vector<Recording>& recordings_;

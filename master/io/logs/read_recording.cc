@@ -2,6 +2,7 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -192,6 +193,15 @@ std::string LogTable::unit_of(std::string_view name) const {
     unit = unit.substr(1, unit.size() - 2);
   }
   return unit;
+}
+
+std::vector<double> LogTable::numbers(std::string_view name) const {
+  std::vector<double> there;
+  const auto column = find(name);
+  for (std::size_t r = 0; column && r < rows(); ++r) {
+    if (std::isfinite(at(r, *column))) there.push_back(at(r, *column));
+  }
+  return there;
 }
 
 }  // namespace gapfarm

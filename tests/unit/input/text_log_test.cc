@@ -124,6 +124,18 @@ TEST(TextLogs, PosesAndCommandsInTwoFiles) {
   expect_the_drive(read({kTwists, "t,x,y,theta\n10,1,2,0.5\n10.1,1.1,2,0.6\n"}));
 }
 
+// A speed aside is a command where there is one; beside poses vx may as well have been measured.
+TEST(TextLogs, TwistsOfThree) {
+  const std::string poses = "t,x,y,theta\n10,1,2,0.5\n10.1,1.1,2,0.6\n";
+  const Read omni = read({"t,vx,vy,wz\n10,0.1,0.2,0\n10.1,0.3,0,-0.2\n", poses});
+  ASSERT_TRUE(omni.runs) << omni.runs.error().message;
+  EXPECT_THAT(omni.runs->log.channels, ElementsAre("v", "vy", "omega"));
+  expect_the_drive(read({"t,vx,vy,wz\n10,0.1,0,0\n10.1,0.3,0,-0.2\n", poses}));
+  const Read measured =
+      read({"t,x,y,theta,vx,vy,wz\n10,1,2,0.5,0.1,0,0\n10.1,1.1,2,0.6,0.3,0,-0.2\n"});
+  EXPECT_TRUE(measured.map.commands.columns.empty());
+}
+
 TEST(TextLogs, Tum) {
   expect_the_drive(
       read({"# timestamp tx ty tz qx qy qz qw\n"
@@ -339,11 +351,15 @@ TEST(LogMaps, ReadBackAndNameMistakes) {
   ASSERT_TRUE(map) << map.error().message;
   EXPECT_EQ(format_map(*map), text);
   const auto bad = parse_map(
-      "[poses]\nt = \"t\"\nx = { column = \"x\", unit = \"mn\" }\ny = {}\n[comands]\n", "m.toml");
+      "[poses]\nt = \"t\"\nx = { column = \"x\", unit = \"mn\" }\ny = {}\nthata = \"yaw\"\n"
+      "[comands]\n",
+      "m.toml");
   ASSERT_FALSE(bad);
   EXPECT_THAT(bad.error().message, HasSubstr("unknown unit 'mn'"));
   EXPECT_THAT(bad.error().message, HasSubstr("m.toml:4:"));
   EXPECT_THAT(bad.error().message, HasSubstr("did you mean 'commands'"));
+  EXPECT_THAT(bad.error().message,
+              HasSubstr("unknown key 'thata' in [poses]; did you mean 'theta'"));
   EXPECT_THAT(bad.error().message, HasSubstr("needs x, y and theta"));
 }
 

@@ -70,6 +70,22 @@ TEST(Urdf, NamesBrokenTrees) {
   EXPECT_THAT(error_of(robot_xml(body_link("a") + body_link("b") +
                                  joint("j", "fixed", "a", "b", "0 nan 0"))),
               HasSubstr("expected a number"));
+  EXPECT_THAT(error_of(robot_xml(body_link("a") + body_link("b") + body_link("c") +
+                                 joint("j", "fixed", "a", "b", "0 0 0") +
+                                 joint("j", "fixed", "a", "c", "0 0 0"))),
+              HasSubstr("found joint 'j' again"));
+}
+
+TEST(Urdf, NamesMassesThatCannotBe) {
+  const std::string inertial = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='";
+  const auto error = [&](const std::string& izz, int times) {
+    std::string all;
+    for (int k = 0; k < times; ++k) all += inertial + izz + "'/></inertial>";
+    return error_of(robot_xml("<link name='a'>" + all + "</link>"));
+  };
+  EXPECT_EQ(error("1", 1), "");
+  EXPECT_THAT(error("1", 2), HasSubstr("found a second <inertial> of link 'a'"));
+  EXPECT_THAT(error("-1", 1), HasSubstr("found a moment of inertia of -1 kg m^2"));
 }
 
 TEST(Urdf, ReadsOverPrefixesThatNobodyDeclared) {

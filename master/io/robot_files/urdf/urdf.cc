@@ -23,7 +23,7 @@ std::string at_line(const std::string& file, int line) {
 // The one link that is nobody's child, when everything hangs together.
 Status check_tree(UrdfModel& model) {
   std::map<std::string, const UrdfJoint*, std::less<>> above;
-  std::set<std::string, std::less<>> names;
+  std::set<std::string, std::less<>> names, joints;
   std::vector<std::string> known;
   for (const UrdfLink& link : model.links) {
     if (!names.insert(link.name).second) {
@@ -33,6 +33,10 @@ Status check_tree(UrdfModel& model) {
     known.push_back(link.name);
   }
   for (const UrdfJoint& joint : model.joints) {
+    if (!joints.insert(joint.name).second) {
+      return Error{at_line(model.file, joint.line) + "found joint " + quoted_word(joint.name) +
+                   " again, expected each name once; rename one of the two"};
+    }
     for (const std::string& end : {joint.parent, joint.child}) {
       if (names.count(end) == 0) {
         return Error{at_line(model.file, joint.line) + "joint " + quoted_word(joint.name) +

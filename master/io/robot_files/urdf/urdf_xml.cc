@@ -115,12 +115,20 @@ class Reader : private XmlReader {
       Eigen::Matrix3d I;
       I << part("ixx"), part("ixy"), part("ixz"), part("ixy"), part("iyy"), part("iyz"),
           part("ixz"), part("iyz"), part("izz");
+      if (I.diagonal().minCoeff() < 0) {
+        fail(*inertia, "found a moment of inertia of " + format_double(I.diagonal().minCoeff()) +
+                           " kg m^2, expected at least 0");
+      }
       inertial.I_C_kgm2 = X_LC.linear() * I * X_LC.linear().transpose();
     }
     if (!unread.empty()) {
       note(inertial.line, "the mass of link " + quoted_word(link.name) + " holds the expression " +
                               quoted_word(unread) + " and was omitted; " + kExpand);
       return;
+    }
+    if (link.inertial) {
+      fail(element, "found a second <inertial> of link " + quoted_word(link.name) +
+                        ", expected one; add the two up");
     }
     link.inertial = inertial;
   }
