@@ -57,11 +57,13 @@ Result<GroundRobot> sense(const GroundRobot& robot, GroundWork* work, RunLog* lo
 }
 
 Status exclude(const std::vector<std::string>& names, std::vector<GroundHypothesis>* catalogue) {
+  const std::vector<std::string> known = mapped(*catalogue, &GroundHypothesis::name);
   for (const std::string& name : names) {
-    const auto wanted = [&](const GroundHypothesis& h) { return h.name == name; };
-    if (std::erase_if(*catalogue, wanted) == 0) {
-      return Error{"--exclude: this robot's catalogue has no \"" + name + "\""};
+    if (!contains(known, name)) {
+      return Error{"--exclude: this robot's catalogue has no \"" + name + "\"" +
+                   suggestion(name, known)};
     }
+    std::erase_if(*catalogue, [&](const GroundHypothesis& h) { return h.name == name; });
   }
   return {};
 }
@@ -97,6 +99,7 @@ Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, Run
     question = std::move(asked);
   }
   RETURN_IF_ERROR(exclude(options.excluded, &question.catalogue));
+  tolerate_ramps(robot, log, &question.catalogue);
   const std::string as_it_was = format_robot(file);
   if (log.relative && !options.reference) {
     clock.begin(kFaultStage);

@@ -160,13 +160,16 @@ class Catalogue {
     }
     const auto& limit = robot_.motors.acceleration_limit_m_s2;
     if (robot_.measured && !limit) return;
+    // Its tolerance depends on what is commanded (tolerate_ramps()); this is a step that shows.
     only_more(value("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
                     {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m"}}));
   }
 
   void marker() {
-    value("marker_offset", {"com_offset"}, "the tracked point on the robot",
-          {row("marker_x"), row("marker_y")});
+    const char* point = skids(robot_)
+                            ? "the tracked point (or, by load or tyres, what the robot turns about)"
+                            : "the tracked point on the robot";
+    value("marker_offset", {"com_offset"}, point, {row("marker_x"), row("marker_y")});
     value("marker_yaw", {"heading_offset"}, "the heading of the tracked point",
           {row("marker_yaw")});
   }
@@ -351,6 +354,17 @@ std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<Groun
   add_gyro_scale(log, &gyro.freed);
   if (!gyro.freed.empty()) all.push_back(std::move(gyro));
   return all;
+}
+
+void tolerate_ramps(const GroundRobot& robot, const RunLog& log,
+                    std::vector<GroundHypothesis>* all) {
+  for (GroundHypothesis& h : *all) {
+    if (h.name != "acceleration_limit") continue;
+    KinematicRow& ramp = h.freed.front();
+    const double shows = ramp_that_shows(robot, log, ramp.nominal, kLag_s);
+    ramp.tolerance = std::min(shows, plausible_error(ramp));
+    h.kept = ramp.tolerance;
+  }
 }
 
 double value_in_file(const GroundRobot& robot, const std::string& name) {

@@ -100,6 +100,11 @@ std::vector<KinematicRow> change_rows(const GroundRobot& robot);
 std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
                                                 const std::vector<KinematicRow>& rows);
 
+// A ramp stands for a lag, and so much of it as delays what this log commands no more than a lag of
+// a well-kept file is off by is nothing that is wrong or changed.
+void tolerate_ramps(const GroundRobot& robot, const RunLog& log,
+                    std::vector<GroundHypothesis>* all);
+
 // What the robot's file has of a row of either.
 double value_in_file(const GroundRobot& robot, const std::string& name);
 

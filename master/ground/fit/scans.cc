@@ -1,6 +1,7 @@
 #include "master/ground/fit/scans.h"
 
 #include <cmath>
+#include <limits>
 
 #include "common/base/ranges.h"
 
@@ -92,6 +93,73 @@ double scatter_of(const std::vector<Eigen::Vector2d>& places) {
   const double squares =
       sum_of(places, [](const Eigen::Vector2d& place) { return place.squaredNorm(); });
   return std::sqrt(squares / n - (sum / n).squaredNorm());
+}
+
+namespace {
+
+constexpr double kSteepest = 1e-6, kFlattest = 1e3;  // ramps, s^2/m
+
+// A wheel's surface is commanded to a speed for so long.
+struct Held {
+  double dt_s, speed_m_s;
+};
+
+// Of each driven wheel, or of a steered robot's driven axle, of each run.
+std::vector<std::vector<Held>> commanded_speeds(const GroundRobot& robot, const RunLog& log) {
+  GroundRobot prompt = robot;
+  prompt.motors.lag_s = prompt.motors.drive_lag_s = prompt.motors.delay_s = 0;
+  prompt.motors.acceleration_limit_m_s2.reset();
+  std::vector<std::vector<Held>> all;
+  for (const LoggedRun& run : log.runs) {
+    std::vector<std::vector<Held>> wheels(is_steered(robot) ? 1 : robot.wheels.size());
+    RobotDrive drive(prompt, run.commands);
+    for (std::size_t k = 0; k + 1 < run.commands.size(); ++k) {
+      const double t = run.commands[k].t_s, dt = run.commands[k + 1].t_s - t;
+      if (!(dt > 0)) continue;
+      const auto motions = drive.advance_motors(t, dt, 0);
+      for (std::size_t w = 0; w < wheels.size(); ++w) {
+        const double speed = is_steered(robot) ? drive.traction_m_s() : motions[w].speed_m_s;
+        wheels[w].push_back({dt, speed});
+      }
+    }
+    append(all, std::move(wheels));
+  }
+  return all;
+}
+
+// How far wheels fall behind their commands, over how much these change.
+double lateness_s(const std::vector<std::vector<Held>>& wheels, double ramp) {
+  double behind_m = 0, changed_m_s = 0;
+  for (const std::vector<Held>& wheel : wheels) {
+    double speed = wheel.empty() ? 0 : wheel.front().speed_m_s, before = speed;
+    for (const Held& held : wheel) {
+      changed_m_s += std::abs(held.speed_m_s - before);
+      before = held.speed_m_s;
+      const double gap = std::abs(held.speed_m_s - speed);
+      const double ramps_s = std::min(held.dt_s, gap * ramp), gained = ramps_s / ramp;
+      behind_m += (gap - gained / 2) * ramps_s + (gap - gained) * (held.dt_s - ramps_s);
+      speed += std::copysign(gained, held.speed_m_s - speed);
+    }
+  }
+  return changed_m_s > 0 ? behind_m / changed_m_s : 0;
+}
+
+}  // namespace
+
+double ramp_that_shows(const GroundRobot& robot, const RunLog& log, double ramp, double by_s) {
+  const std::vector<std::vector<Held>> wheels = commanded_speeds(robot, log);
+  const double late_s = lateness_s(wheels, std::max(ramp, kSteepest));
+  double nearest = std::numeric_limits<double>::infinity();
+  for (double end : {kSteepest, kFlattest}) {
+    const auto shows = [&](double at) { return std::abs(lateness_s(wheels, at) - late_s) > by_s; };
+    if (!shows(end)) continue;
+    for (double same = ramp; std::abs(end - same) > 1e-3 * end;) {
+      const double middle = (same + end) / 2;
+      (shows(middle) ? end : same) = middle;
+    }
+    nearest = std::min(nearest, std::abs(end - ramp));
+  }
+  return nearest;
 }
 
 }  // namespace gapfarm

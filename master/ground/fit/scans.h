@@ -37,4 +37,10 @@ std::vector<Eigen::Vector2d> wheel_places(const WindowFitter& fitter,
 // Root mean square of how far places lie from their middle.
 double scatter_of(const std::vector<Eigen::Vector2d>& places);
 
+// How far (s^2/m) a ramp has to be from this one, so that wheels reach the speeds that they are
+// commanded to later or sooner by `by_s`, on average over how much these change: the same ramp is
+// felt where a robot is driven hard.  Infinite: nothing that is commanded here shows it.
+// REQUIRES: a complete robot without a throttle.
+double ramp_that_shows(const GroundRobot& robot, const RunLog& log, double ramp, double by_s);
+
 }  // namespace gapfarm

@@ -14,6 +14,7 @@
 #include "common/robot/robot.h"
 #include "common/robot/robot_drive.h"
 #include "master/ground/diagnose_ground.h"
+#include "master/ground/fit/scans.h"
 #include "master/ground/tolerances.h"
 #include "tests/unit/ground/driven_log.h"
 #include "tests/unit/trials/shared_data.h"
@@ -179,6 +180,41 @@ TEST(WrongFile, AnAccelerationLimitThatTheFileHasNotIsNamed) {
   ASSERT_EQ(found.diagnosis.effects.size(), 1u) << found.diagnosis.headline;
   EXPECT_EQ(found.diagnosis.effects.front().name, "acceleration_limit");
   EXPECT_NEAR(found.diagnosis.effects.front().parameters.at(0).value, 2, 0.05);
+}
+
+// A ramp that is steeper than what is commanded only spreads the commands' steps, as a lag within
+// its tolerance would: of foreign drives it was named wherever nothing was wrong.
+TEST(WrongFile, ARampThatIsFeltAsLittleAsALagIsNotNamed) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const RunLog log = driven(robot, {});
+  const double shows = ramp_that_shows(robot, log, 0, 0.03);
+  for (const double share : {0.6, 3.0}) {
+    const auto found =
+        checked(robot, driven(robot, off_by({"ramp"}, {share * shows})), std::to_string(share));
+    EXPECT_EQ(names(found, "acceleration_limit"), share > 1) << found.diagnosis.headline;
+  }
+}
+
+TEST(Scans, RampsAreFeltByWhatIsCommanded) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const double rim = *robot.wheels.front().radius_m;
+  const auto commanded = [](std::vector<CommandRow> rows) {
+    RunLog log;
+    log.channels = {"left", "right"};
+    log.runs.emplace_back().commands = std::move(rows);
+    return log;
+  };
+  // Half of the time that a step's ramp takes.
+  const RunLog step = commanded({{0, {0, 0}}, {1, {8, 8}}, {9, {8, 8}}});
+  EXPECT_NEAR(ramp_that_shows(robot, step, 0, 0.03), 2 * 0.03 / (8 * rim), 1e-3);
+  EXPECT_NEAR(ramp_that_shows(robot, step, 2, 0.03), 2 * 0.03 / (8 * rim), 5e-3);
+  EXPECT_EQ(ramp_that_shows(robot, commanded({{0, {8, 8}}, {9, {8, 8}}}), 0, 0.03), INFINITY);
+  // Stairs of 50 ms that climb by 1 m/s^2: all that is steeper is late by less than half a row.
+  std::vector<CommandRow> stairs;
+  for (int k = 0; k <= 40; ++k) stairs.push_back({0.05 * k, {0.05 * k / rim, 0.05 * k / rim}});
+  const double ramp = ramp_that_shows(robot, commanded(stairs), 0, 0.03);
+  EXPECT_GT(ramp, 1);
+  EXPECT_LT(ramp, 1.1);
 }
 
 // A lag and a delay explain most, held out, but gain little in sample beside small moves of all
