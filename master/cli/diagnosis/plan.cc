@@ -29,7 +29,7 @@ constexpr OptionOf kPlanOptions[] = {
 Status read_place(const std::string& text, plan::DriveSettings* place) {
   const auto read = [](std::string_view part, double* value) {
     *value = parse_double(part).value_or(0);
-    return *value > 0 && *value <= 1000;
+    return *value >= 0.1 && *value <= 1000;
   };
   const auto sides = parts_of(text, 'x');
   if (sides.size() <= 2 && read(sides.front(), &place->length_m) &&
@@ -37,7 +37,7 @@ Status read_place(const std::string& text, plan::DriveSettings* place) {
     return {};
   }
   return Error{"--place is '" + text +
-               "', expected the size of a floor in metres, such as 2, 2x2 or 4x3"};
+               "', expected the size of a floor in metres from 0.1 on, such as 2, 2x2 or 4x3"};
 }
 
 Status apply_options(PlanOptions& options, Config& config) {
