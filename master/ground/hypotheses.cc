@@ -143,8 +143,9 @@ class Catalogue {
             is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
     }
     if (moves_later(robot_)) {
-      value("motor_lag", {"acceleration_limit"}, "the lag of the driven wheels",
-            {row("drive_lag")});
+      std::vector<std::string> aliases = {"acceleration_limit"};
+      if (changes_) aliases.emplace_back("friction");  // tyres that spin as they speed up
+      value("motor_lag", std::move(aliases), "the lag of the driven wheels", {row("drive_lag")});
     }
     if (is_throttled(robot_)) {
       value("throttle_gain", {"payload", "battery_voltage"}, "the acceleration a unit of throttle",
