@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any, Optional, Sequence
+from typing import Any, Optional, Sequence, Union
 
 import pandas as pd
 
 from ._logs import Path
 from ._model import Model
-from ._program import Progress, command
+from ._program import Progress, command, files
 
 
 class Diagnosis:
@@ -51,21 +51,28 @@ class Diagnosis:
 
     @property
     def where(self) -> pd.DataFrame:
-        """Where the gap lies, a row a finding: command, component, kind, covariate, size (m or rad),
+        """Where the gap lies, a row a finding: command, component, kind, covariate, size (unit: mm, or mrad),
         share of the gap, p, text."""
         return pd.DataFrame(self.data["where"])
 
     @property
     def model(self) -> Model:
-        """The tuned model with the effects that were named."""
-        return Model(self.path if os.path.isdir(self.path) else os.path.dirname(self.path))
+        """The tuned model with the effects that were named.  A ground robot's diagnosis has none:
+        what it corrects is robot.toml, beside it."""
+        folder = self.path if os.path.isdir(self.path) else os.path.dirname(self.path)
+        if not os.path.exists(os.path.join(folder, "model.toml")):
+            raise FileNotFoundError(
+                f"{folder} has no model.toml: of an unusable log there is none, and of a ground "
+                "robot robot.toml is what was corrected"
+            )
+        return Model(folder)
 
 
 def diagnose(
     config: Path,
     out: Path,
     *options: str,
-    trials: Sequence[Path] = (),
+    trials: Union[Path, Sequence[Path]] = (),
     progress: Optional[Progress] = None,
 ) -> Diagnosis:
     """`gapfarm diagnose CONFIG --out OUT` of the trial logs `trials`, else of the config's own.
@@ -73,8 +80,6 @@ def diagnose(
     `options` are more of its words ("--workers", "4"); `progress` is called with every line that it
     says.  Raises GapfarmError; one of exit code 85 was stopped, and the same call goes on.
     """
-    words = ["diagnose", os.fspath(config), "--out", os.fspath(out), *options]
-    if trials:
-        words += ["--trials", *(os.fspath(file) for file in trials)]
-    command(words, progress)
+    words: list[str] = ["diagnose", os.fspath(config), "--out", os.fspath(out), *options]
+    command(words + files("--trials", trials), progress)
     return Diagnosis(out)

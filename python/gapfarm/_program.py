@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import subprocess
-from typing import Any, Callable, Optional, Sequence
+from typing import Any, Callable, Optional, Sequence, Union
 
 Progress = Callable[[str], None]
 
@@ -30,6 +30,12 @@ def _program() -> str:
     return found
 
 
+def files(option: str, named: "Union[str, os.PathLike[str], Sequence[Union[str, os.PathLike[str]]]]") -> "list[str]":
+    """The option with its files, of which one may stand alone; nothing where there are none."""
+    several = [named] if isinstance(named, (str, os.PathLike)) else named
+    return [option, *(os.fspath(file) for file in several)] if several else []
+
+
 def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
     """Runs ``gapfarm WORDS --json`` and returns its result as Python values.
 
@@ -37,14 +43,17 @@ def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
     with what gapfarm printed and its exit code; exit code 3 (done, but tasks were given up) is no error.
     """
     program = _program()
-    process = subprocess.Popen(
-        [program, *map(str, words), "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
-        text=True,
-        errors="replace",
-    )
+    try:
+        process = subprocess.Popen(
+            [program, *map(str, words), "--json"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            errors="replace",
+        )
+    except OSError as failed:
+        raise GapfarmError(f"{program}: {failed.strerror}; name the program in GAPFARM", 2) from None
     # Results are small enough for the pipe only sometimes, so both are read at once.
     import threading
 

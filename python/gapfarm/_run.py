@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import operator
 import os
 import sqlite3
 import urllib.parse
@@ -14,7 +15,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from ._model import Model
-from ._program import Progress, command
+from ._program import Progress, command, files
 
 _SCHEMA = 5
 _FIRST_WITH_INCIDENTS = 2
@@ -84,7 +85,7 @@ class Run:
         if generation is None:
             where = "WHERE generation = (SELECT max(generation) FROM generations)"
         elif generation != 0:
-            where, values = "WHERE generation = ?", [generation]
+            where, values = "WHERE generation = ?", [self._committed(generation)]
         table = self._table(
             "SELECT generation, rank, birth_id, fitness, outcome, scores, operators, parameters, "
             f"{self._objectives()} AS objectives FROM individuals {where} ORDER BY generation, rank",
@@ -93,6 +94,14 @@ class Run:
         parameters = pd.DataFrame([json.loads(p) for p in table.pop("parameters")])
         objectives = pd.DataFrame([json.loads(o or "{}") for o in table.pop("objectives")])
         return pd.concat([table, parameters, objectives.add_prefix("objective.")], axis=1)
+
+    def _committed(self, generation: int) -> int:
+        number = operator.index(generation)  # numpy's, too
+        with self._open() as db:
+            (last,) = db.execute("SELECT max(generation) FROM generations").fetchone()
+        if not 1 <= number <= (last or 0):
+            raise ValueError(f"{self.folder} has no generation {number}, its last is {last or 0}")
+        return number
 
     def _objectives(self) -> str:
         with self._open() as db:
@@ -122,7 +131,7 @@ class Run:
         with self._open() as db:
             rows = db.execute(
                 f"SELECT genome FROM individuals WHERE generation = {which} ORDER BY rank",
-                [] if generation is None else [generation],
+                [] if generation is None else [self._committed(generation)],
             ).fetchall()
         return np.array([np.frombuffer(genome, dtype=np.float64) for (genome,) in rows])
 
@@ -157,14 +166,12 @@ def evolve(
     config: "str | os.PathLike[str]",
     out: "str | os.PathLike[str]",
     *options: str,
-    trials: Sequence["str | os.PathLike[str]"] = (),
+    trials: "str | os.PathLike[str] | Sequence[str | os.PathLike[str]]" = (),
     progress: Optional[Progress] = None,
 ) -> Run:
     """`gapfarm evolve CONFIG --out OUT`; `options` are more of its words ("--workers", "4").
 
     Raises GapfarmError; one of exit code 85 was stopped and can be resumed."""
-    words = ["evolve", os.fspath(config), "--out", os.fspath(out), *options]
-    if trials:
-        words += ["--trials", *(os.fspath(file) for file in trials)]
-    command(words, progress)
+    words: list[str] = ["evolve", os.fspath(config), "--out", os.fspath(out), *options]
+    command(words + files("--trials", trials), progress)
     return Run(out)

@@ -25,7 +25,10 @@ def answer(function: Function, parameters: Mapping[str, Any], seed: int) -> "dic
         if reply.get("value") is not None:
             reply["value"] = float(reply["value"])
         if "values" in reply:
-            reply["values"] = {str(name): float(value) for name, value in reply["values"].items()}
+            reply["values"] = {
+                str(name): None if value is None else float(value)
+                for name, value in reply["values"].items()
+            }
         reply["violations"] = [float(violation) for violation in reply.get("violations", [])]
         json.dumps(reply)  # notes, or what the protocol does not know, may be no JSON
     except Exception as error:  # noqa: BLE001 - whatever a user's function raises
@@ -56,5 +59,7 @@ def serve(function: Function, parameters: Sequence[Mapping[str, Any]], name: str
         if "id" in asked:
             reply = {"id": asked["id"], **answer(function, asked["parameters"], asked["seed"])}
         else:
-            reply = {"gapfarm": 1, "name": name or function.__name__, "parameters": list(parameters)}
-        print(json.dumps(reply), file=answers, flush=True)
+            called = name or getattr(function, "__name__", "objective")
+            reply = {"gapfarm": 1, "name": called, "parameters": list(parameters)}
+        # Bounds may be numpy's.
+        print(json.dumps(reply, default=lambda number: number.item()), file=answers, flush=True)

@@ -9,6 +9,8 @@ import pathlib
 import pickle
 import re
 import sqlite3
+import subprocess
+import sys
 import typing
 
 import numpy as np
@@ -58,6 +60,11 @@ def test_individuals_have_parameters_and_genomes(run):
     assert len(run.individuals(0)) == 24
     genomes = run.genomes()
     assert genomes.shape == (8, 7) and genomes.dtype == np.float64
+    best = run.generations.best.idxmax()  # a numpy integer
+    assert len(run.individuals(best)) == 8 and run.genomes(best).shape == (8, 7)
+    for of in (run.individuals, run.genomes):
+        with pytest.raises(ValueError, match="no generation 9, its last is 3"):
+            of(9)
     assert ((genomes >= 0) & (genomes <= 1)).all()
     assert run.best.fitness == run.generations.best.iloc[-1]
 
@@ -95,11 +102,18 @@ def test_a_simulated_log_follows_its_seed(run, tmp_path):
     np.testing.assert_array_equal(first.theta1, again.theta1)
 
 
-def test_errors_are_gapfarms_own(tmp_path):
+def test_errors_are_gapfarms_own(tmp_path, monkeypatch):
     with pytest.raises(gapfarm.GapfarmError, match="none.toml") as error:
         gapfarm.evolve(tmp_path / "none.toml", tmp_path / "run")
     assert error.value.exit_code == 2
     assert pickle.loads(pickle.dumps(error.value)).exit_code == 2
+    # One log may stand alone.
+    with pytest.raises(gapfarm.GapfarmError, match="none.csv"):
+        gapfarm.evolve(DEMO, tmp_path / "run", trials=str(tmp_path / "none.csv"))
+    with monkeypatch.context() as other:
+        other.setenv("GAPFARM", str(tmp_path / "none"))
+        with pytest.raises(gapfarm.GapfarmError, match="No such file"):
+            gapfarm.evolve(DEMO, tmp_path / "run")
     with pytest.raises(FileNotFoundError):
         gapfarm.Run(tmp_path)
     with pytest.raises(FileNotFoundError):
@@ -133,6 +147,8 @@ def test_a_diagnosis_is_tables(tmp_path):
     data["effects"] = []
     (tmp_path / "diagnosis.json").write_text(json.dumps(data))
     assert gapfarm.Diagnosis(tmp_path).effects.empty
+    with pytest.raises(FileNotFoundError, match="robot.toml"):
+        gapfarm.Diagnosis(tmp_path).model
 
 
 def test_the_page_of_examples_runs(run, tmp_path, monkeypatch):
@@ -202,6 +218,21 @@ def test_what_an_objective_cannot_answer_is_a_failed_evaluation(capsys):
     assert "Traceback" in capsys.readouterr().err
     assert answer(lambda *_: "rubbish")["outcome"] == "failed"
     assert "set is not JSON" in answer(lambda *_: {"value": 1, "notes": {3}})["message"]
+    assert answer(lambda *_: {"values": {"a": None}}) == {"values": {"a": None}, "violations": []}
+
+
+def test_an_objective_may_be_any_callable_with_numpys_bounds():
+    script = (
+        "import functools, numpy as np, gapfarm.objective as o\n"
+        "o.serve(functools.partial(lambda data, p, seed: data + p['x'], 2),"
+        " [{'key': 'x', 'lower': np.float32(-1), 'upper': np.int64(1), 'nominal': 0}])\n"
+    )
+    asked = '{}\n{"id": 4, "parameters": {"x": 1}, "seed": 7}\n'
+    done = subprocess.run([sys.executable, "-c", script], input=asked, capture_output=True, text=True,
+                          env={**os.environ, "PYTHONPATH": str(ROOT / "python")})
+    declared, answered = map(json.loads, done.stdout.splitlines())
+    assert declared["name"] == "objective" and declared["parameters"][0]["upper"] == 1
+    assert answered == {"id": 4, "value": 3.0, "violations": []}
 
 
 def test_paths_come_with_a_simulated_log(run):
