@@ -57,11 +57,22 @@ const CLI::App& innermost(const CLI::App& app, std::string* arguments) {
 }
 
 // Answers a command line that was not understood, and --help and --version.
-int answer_parse_error(const CLI::App& app, const CLI::ParseError& error, Console& console) {
+int answer_parse_error(const CLI::App& app, const std::vector<std::string>& arguments,
+                       const CLI::ParseError& error, Console& console) {
   std::string command;
   const CLI::App& at = innermost(app, &command);
   const std::vector<std::string> unknown = app.remaining(true);
-  const std::string word = unknown.empty() ? "" : unknown.front();
+  // An option comes first: it takes what follows with it, up to what is another command's.
+  const auto rest = std::ranges::find(arguments, "--");
+  const auto option = std::find_if(arguments.begin(), rest, [&](const std::string& argument) {
+    return is_option(argument) && contains(unknown, argument);
+  });
+  // Where a value could not be read, the rest of the line is no mistake.
+  const bool value = dynamic_cast<const CLI::ConversionError*>(&error) != nullptr ||
+                     dynamic_cast<const CLI::ValidationError*>(&error) != nullptr;
+  const std::string word = value || unknown.empty() ? ""
+                           : option != rest         ? *option
+                                                    : unknown.front();
   const bool is_command = !word.empty() && !is_option(word) && !at.get_subcommands({}).empty();
   // --help, --version; but no help is about a command that there is not.
   if (error.get_exit_code() == 0 && !is_command) {
@@ -127,7 +138,7 @@ int run_arguments(const std::vector<std::string>& arguments) {
   } catch (const CLI::ParseError& error) {
     // What was not understood may be before the flag.
     if (contains(arguments, "--json")) console.use_json();
-    const int exit_code = console.end(answer_parse_error(*program->app, error, console));
+    const int exit_code = console.end(answer_parse_error(*program->app, arguments, error, console));
     std::string ignored;
     if (exit_code != kExitDone) {
       conclude_command(innermost(*program->app, &ignored), exit_code, context);

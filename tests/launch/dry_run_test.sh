@@ -47,7 +47,7 @@ secret=$(sed -n 's/.*secret[^A-Za-z0-9]*//p' "$T/keys/worker.key" | head -n 1)
 expect_submit() {
   local system=$1 wanted printed
   shift
-  printed=$("$BIN/gapfarm" submit --on "$system" --keys "$T/keys" --max 8 --dry-run -- evolve c.toml --out r 2>&1) ||
+  printed=$("$BIN/gapfarm" submit --on "$system" --keys "$T/keys" --max 8 --dry-run -- evolve configs/demo.toml --out "$T/r" 2>&1) ||
     fail "$printed"
   for wanted in "$@"; do [[ $printed == *"$wanted"* ]] || fail "submit printed: $printed"; done
 }
@@ -57,6 +57,13 @@ printed=$("$BIN/gapfarm" evolve configs/demo.toml --out "$T/run" --keys "$T/keys
   fail "$printed"
 [[ $printed == *'up to 9 workers'*'sbatch '*'--array=0-8'* ]] || fail "evolve printed: $printed"
 expect_submit pbs '-r y' 'qrerun' '--workers-on pbs'
+# What the job would find wrong is found before it is queued.
+for wrong in 'none.toml' 'configs/demo.toml --generatons 4'; do
+  # shellcheck disable=SC2086
+  printed=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 8 -- evolve $wrong --out "$T/r" 2>&1) &&
+    fail "submitted $wrong"
+  [[ $printed == *'the job would fail: '* ]] || fail "submit printed: $printed"
+done
 "$BIN/gapfarm" workers --on slurm --max 2 2>/dev/null && fail 'submitted without an endpoint'
 "$BIN/gapfarm" workers --on nowhere --max 2 --connect tcp://m:1 2>/dev/null && fail 'knew a system nowhere'
 [[ ! -e $T/ran ]] || fail "ran $(<"$T/ran")"

@@ -64,6 +64,19 @@ std::string master_script(const std::string& run, const std::string& evolve,
       resume, evolve, requeue);
 }
 
+// What the job would find wrong, before it has waited in a queue for it.
+Status check_job(std::vector<std::string> arguments) {
+  arguments.emplace_back("--dry-run");
+  ChildSetup setup;
+  setup.arguments = std::move(arguments);
+  ASSIGN_OR_RETURN(const Captured captured, run_captured(std::move(setup), "", kSubmitLimit_s));
+  if (captured.succeeded()) return {};
+  constexpr std::string_view kSelf = "gapfarm: ";
+  std::string_view text = captured.err;
+  if (text.starts_with(kSelf)) text.remove_prefix(kSelf.size());
+  return Error{"the job would fail: " + std::string(text.substr(0, text.find('\n')))};
+}
+
 Result<int> run_submit(SubmitCommand command, CliContext& context) {
   if (command.evolve.empty() || command.evolve.front() != "evolve") {
     return Error{"submit needs -- evolve CONFIG --out RUN"};
@@ -87,6 +100,10 @@ Result<int> run_submit(SubmitCommand command, CliContext& context) {
   append(evolve, command.evolve);
   append(evolve, farm);
   append(resume, farm);
+  const bool resumes = std::filesystem::exists(run + "/run.sqlite");
+  RETURN_IF_ERROR(check_job(resumes ? resume : evolve));
+  if (resumes)
+    context.console.note(run + " holds a run: the job resumes it, and no config is read");
   const std::string script = master_script(run, quoted(evolve), quoted(resume), site.requeue);
 
   const std::string logs = std::filesystem::absolute(command.fleet.logs).string();
