@@ -105,7 +105,8 @@ class Importer {
     std::map<RunKey, std::vector<double>> before;  // of each run: its last row
     RowTally& tally = tallies_[kind.name];
     const std::set<std::size_t> broken = broken_rows(table);
-    std::size_t part = 0;
+    std::size_t part = 0, legible = 0, garbled = 0;
+    std::string first_garbled;
     for (std::size_t r = 0; r < table.rows(); ++r) {
       if (broken.contains(r)) {
         ++part;
@@ -127,8 +128,16 @@ class Importer {
       if (!whole || (poses && !to_pose(map, values))) {
         if (map.increments || map.intervals) return broken_chain(table, r, kind.name);
         ++tally.blank;
+        for (const std::size_t column : at) {
+          const std::string text = cell(table, column, r);
+          if (text.empty() || parse_double(text)) continue;
+          if (garbled++ == 0)
+            first_garbled = quoted_word(text) + " in row " + std::to_string(r + 1);
+          break;
+        }
         continue;
       }
+      ++legible;
       const RunKey key{cell(table, session, r), part_of(cell(table, run, r), part)};
       const bool leads_on = poses && (map.intervals || before.count(key) != 0);
       if (leads_on && map.increments && std::abs(values[3]) > std::numbers::pi) {
@@ -149,6 +158,13 @@ class Importer {
       const auto [stretch, begun] = stretches.try_emplace(key);
       if (begun) stretch->second.place = stretches.size();
       put_row(tally, stretch->second, values, table.source, r);
+    }
+    if (legible > 0 && garbled > legible) {  // of none the column is named
+      return Error{
+          table.source + ": found no numbers for [" + kind.name + "] in " +
+          std::to_string(garbled) + " of " + std::to_string(table.rows()) + " rows, the first " +
+          first_garbled +
+          ", expected numbers in most of them; write them without signs between thousands"};
     }
     used_.insert(table.source);
     return {};

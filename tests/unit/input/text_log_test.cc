@@ -136,6 +136,24 @@ TEST(TextLogs, TwistsOfThree) {
   EXPECT_TRUE(measured.map.commands.columns.empty());
 }
 
+// Blanks are another topic's rows; text where numbers are expected is what is wrong.
+TEST(TextLogs, MostRowsHaveNumbers) {
+  const auto rows = [](const std::string& x, int times) {
+    std::string log = "t,x,y,theta,v,w\n";
+    for (int k = 0; k < 6; ++k) {
+      log += std::to_string(k) + ".5," + (k < times ? x : "1") + ",2,0.5,0.1,0\n";
+    }
+    return read({log}).runs;
+  };
+  EXPECT_TRUE(rows("lost", 2) && rows("", 4));
+  const auto most = rows("\"1,234.5\"", 4);
+  ASSERT_FALSE(most);
+  EXPECT_THAT(
+      most.error().message,
+      AllOf(HasSubstr("no numbers for [poses] in 4 of 6 rows, the first '1,234.5' in row 1"),
+            HasSubstr("without signs between thousands")));
+}
+
 TEST(TextLogs, Tum) {
   expect_the_drive(
       read({"# timestamp tx ty tz qx qy qz qw\n"
