@@ -105,15 +105,25 @@ const char* baseline_of(const Horizons& horizons) {
   return horizons.kinematics.names.empty() ? "constant velocity" : "kinematics";
 }
 
-std::string significantly_apart(const Horizons& horizons) {
+// Medians of the simulation that are significantly off the baseline's.
+struct Apart {
   int below = 0, above = 0, untold = 0;
+};
+
+Apart significantly_apart(const Horizons& horizons) {
+  Apart apart;
   for (const HorizonRow& row : horizons.rows) {
     for (const DrawnRatio& drawn : {row.position, row.heading}) {
-      untold += !drawn.interval;
-      below += drawn.interval && (*drawn.interval)[1] < 1;
-      above += drawn.interval && (*drawn.interval)[0] > 1;
+      apart.untold += !drawn.interval;
+      apart.below += drawn.interval && (*drawn.interval)[1] < 1;
+      apart.above += drawn.interval && (*drawn.interval)[0] > 1;
     }
   }
+  return apart;
+}
+
+std::string apart_text(const Horizons& horizons) {
+  const auto [below, above, untold] = significantly_apart(horizons);
   return fmt::format(
       "of {} medians {} significantly below those of {}, {} significantly above (90 % intervals of "
       "their ratio, by drawing runs again){}\n",
@@ -233,7 +243,7 @@ std::string format_horizons(const Horizons& horizons) {
             fmt::format(" {:>9.3f} | {:>20}  {:>20}\n", row.log_score, ratio_cell(row.position),
                         ratio_cell(row.heading));
   }
-  text += significantly_apart(horizons);
+  text += apart_text(horizons);
   if (const std::size_t n = horizons.unfinished_runs; n > 0) {
     text += fmt::format(
         "{} run{} could not be simulated to the end (the robot fell over or left bounds); windows "
@@ -255,7 +265,17 @@ Json horizons_json(const Horizons& horizons) {
                 {"position_m_m", e.position_m_m},
                 {"heading_rad_m", e.heading_rad_m}};
   };
-  Json json = {{"rows", Json::array()}, {"unfinished_runs", horizons.unfinished_runs}};
+  const auto interval = [](const DrawnRatio& drawn) {
+    return drawn.interval ? Json(*drawn.interval) : Json();
+  };
+  const Apart apart = significantly_apart(horizons);
+  Json json = {{"rows", Json::array()},
+               {"unfinished_runs", horizons.unfinished_runs},
+               {"significantly_below", apart.below},
+               {"significantly_above", apart.above}};
+  for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {
+    json["fitted_kinematics"][horizons.kinematics.names[i]] = horizons.kinematics.values[i];
+  }
   for (const HorizonRow& row : horizons.rows) {
     Json& one = json["rows"].emplace_back(Json{{"horizon_s", row.horizon_s},
                                                {"windows", row.windows},
@@ -264,7 +284,9 @@ Json horizons_json(const Horizons& horizons) {
                                                {"simulation", errors(row.simulation)},
                                                {"constant_velocity", errors(row.constant_velocity)},
                                                {"position_ratio", row.position.ratio},
-                                               {"heading_ratio", row.heading.ratio}});
+                                               {"position_ratio_90", interval(row.position)},
+                                               {"heading_ratio", row.heading.ratio},
+                                               {"heading_ratio_90", interval(row.heading)}});
     if (!horizons.kinematics.names.empty()) one["kinematics"] = errors(row.kinematics);
   }
   return json;

@@ -80,7 +80,8 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
 std::string format_horizons(const Horizons& horizons);
 
 // The same for machines: "rows" with "simulation", "kinematics" and "constant_velocity" in m and
-// rad, "unfinished_runs".
+// rad, and 90 % intervals of ratios (null: too few windows); "fitted_kinematics",
+// "significantly_below" and "_above", "unfinished_runs".
 Json horizons_json(const Horizons& horizons);
 
 // Every window as a headed CSV table (docs/formats.md).

@@ -1,8 +1,11 @@
 // gapfarm horizons RUN|CONFIG: how far off a ground robot's simulation is at several horizons.
 #include "master/ground/horizons.h"
 
+#include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/trials/text/csv.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
@@ -29,8 +32,23 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
     return Error{command.source + ": scenario " + fitted.problem.scenario +
                  " has no runs to cut into windows; gapfarm predict compares its trials"};
   }
+  for (std::size_t i = 0; i < fitted.folders.size(); ++i) {
+    const auto before = std::span(fitted.folders).first(i);
+    if (std::ranges::any_of(before, [&](const std::string& other) {
+          std::error_code ignored;
+          return std::filesystem::equivalent(other, fitted.folders[i], ignored);
+        })) {
+      return Error{"--trials: found " + fitted.folders[i] +
+                   " again, expected each log once: its windows would count twice"};
+    }
+  }
   ASSIGN_OR_RETURN(const auto runs, read_run_folders(fitted.folders, fitted.problem.channels()));
   for (const std::string& note : runs.notes) console.note(note);
+  std::vector<double> horizons_s;
+  for (const double horizon : command.horizons) {
+    if (!contains(horizons_s, horizon)) horizons_s.push_back(horizon);
+  }
+  command.horizons = std::move(horizons_s);
   if (context.dry_run) {
     return print_dry_run("measure horizons of " + command.source,
                          {{"source", command.source}, {"horizons", command.horizons}}, command.farm,
@@ -47,6 +65,11 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   }
   if (!command.out.empty()) {
     RETURN_IF_ERROR(command.outputs.write(command.out, windows_csv(horizons)));
+  }
+  for (const double horizon : command.horizons) {
+    if (!contains(horizons.rows, horizon, &HorizonRow::horizon_s)) {
+      console.note("no window of " + format_double(horizon) + " s fits into these runs");
+    }
   }
   console.result(format_horizons(horizons), horizons_json(horizons));
   return kExitDone;
@@ -70,8 +93,9 @@ SubcommandRun setup_horizons(CLI::App& app) {
   app.add_option("--out", command->out, "Every window with its errors, m and rad (CSV)");
   command->declare(app, LongOptions::Leaves::kFolder, false);
   app.footer(
-      "Beside the simulation stand the robot's own kinematics, fitted to the same windows by least "
-      "squares,\nand constant velocity. A program of yours has the latter alone.\n\n"
+      "Beside the simulation stand the robot's own kinematics, fitted by least squares to the "
+      "windows\nthat the run was fitted to (of a config: to those of --trials), of the config's "
+      "lengths, and\nconstant velocity. A program of yours has the latter alone.\n\n"
       "Examples:\n"
       "  gapfarm horizons run/warthog --trials held_out --picture paths.svg\n"
       "  gapfarm horizons warthog.toml --horizons 1 10");
