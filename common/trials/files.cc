@@ -35,8 +35,11 @@ Result<std::string> read_text_file(const std::string& path) {
   }
   if (std::filesystem::is_directory(status)) {
     const std::filesystem::path model = std::filesystem::path(path) / "model.toml";
-    return Error{path + ": is a folder, expected a file; name " +
-                 (is_there(model) ? model.string() : "the files in it")};
+    const bool runs = is_there(std::filesystem::path(path) / "commands.csv");
+    return Error{path +
+                 (runs ? ": is a folder of runs, expected a file; gapfarm horizons predicts runs"
+                       : ": is a folder, expected a file; name " +
+                             (is_there(model) ? model.string() : "the files in it"))};
   }
   std::ifstream in(path, std::ios::binary);
   std::ostringstream bytes;

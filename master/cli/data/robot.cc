@@ -200,6 +200,12 @@ bool names_a_robot(const std::vector<std::string>& arguments) {
 Result<int> run_init_robot(const std::vector<std::string>& arguments, const std::string& out,
                            Outputs& outputs, CliContext& context) {
   const RobotSetup setup = setup_of_arguments(arguments, out);
+  for (const std::string& file : setup.files) {
+    if (!ends_with(file, {".csv", ".tsv", ".txt", ".bag", ".db3", ".mcap"})) continue;
+    return Error{file +
+                 ": is a log, expected a robot's files and folders of runs; gapfarm import "
+                 "runs makes such a folder of logs"};
+  }
   ASSIGN_OR_RETURN(const RobotTexts texts, set_up_robot(setup, outputs));
   if (out != "-") RETURN_IF_ERROR(outputs.plan(std::vector<std::string>{setup.robot, out}));
   Json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};
