@@ -192,6 +192,32 @@ TEST_F(GroundCommands, HorizonsAreNumbersFromZeroOn) {
   }
 }
 
+TEST_F(GroundCommands, HorizonsCountEachLogOnceAndPrintAllAsJson) {
+  write_runs("monday", {0.2, 0.3});
+  const std::string monday = folder_ / "monday";
+  const Finished twice =
+      gapfarm_command({"horizons", config(""), "--trials", monday, monday + "/"});
+  EXPECT_EQ(twice.exit_code, 2) << twice.out;
+  EXPECT_THAT(twice.err, HasSubstr("again, expected each log once"));
+  const Finished once = gapfarm_command({"horizons", config(""), "--trials", monday, "--horizons",
+                                         "0.5", "0.5", "1000", "--workers", "1", "--json"});
+  ASSERT_EQ(once.exit_code, 0) << once.err;
+  EXPECT_THAT(once.err, HasSubstr("no window of 1000 s fits"));
+  const auto result = json::parse(once.out);
+  ASSERT_EQ(result["rows"].size(), 1u);
+  for (const char* key : {"position_ratio_90", "heading_ratio_90"}) {
+    EXPECT_TRUE(result["rows"][0].contains(key)) << key;
+  }
+  EXPECT_TRUE(result["fitted_kinematics"].contains("delay"));
+}
+
+TEST_F(GroundCommands, LogsInTheWrongPlaceLeadToTheCommandThatReadsThem) {
+  write_runs("monday", {0.2});
+  const Finished beside = gapfarm_command(
+      {"init", config(""), folder_ / "monday/poses.csv", "--out", folder_ / "c.toml"});
+  EXPECT_THAT(beside.err, HasSubstr("gapfarm import runs"));
+}
+
 TEST_F(GroundCommands, CheckFindsTimesInMilliseconds) {
   write_runs("slow", {0.2}, 1e3);
   const Finished checked = gapfarm_command({"check", config(""), "--trials", folder_ / "slow"});

@@ -57,6 +57,8 @@ printed=$("$BIN/gapfarm" evolve configs/demo.toml --out "$T/run" --keys "$T/keys
   fail "$printed"
 [[ $printed == *'up to 9 workers'*'sbatch '*'--array=0-8'* ]] || fail "evolve printed: $printed"
 expect_submit pbs '-r y' 'qrerun' '--workers-on pbs'
+printed=$("$BIN/gapfarm" submit --on slurm --mx 3 -- evolve configs/demo.toml --out "$T/r" 2>&1) && fail 'knew --mx'
+[[ $printed == *"'--mx'; did you mean '--max'?"* ]] || fail "submit printed: $printed"
 # What the job would find wrong is found before it is queued.
 for wrong in 'none.toml' 'configs/demo.toml --generatons 4'; do
   # shellcheck disable=SC2086
