@@ -25,11 +25,13 @@ constexpr OptionOf kPlanOptions[] = {
     {"--want", kOfDrive},    {"--limit", kOfDrive},
 };
 
+constexpr double kLeastFloor_m = 0.1;  // the smallest robots here, and pieces, are as large
+
 // "2", "2x2" or "4x3".
 Status read_place(const std::string& text, plan::DriveSettings* place) {
   const auto read = [](std::string_view part, double* value) {
     *value = parse_double(part).value_or(0);
-    return *value >= 0.1 && *value <= 1000;
+    return *value >= kLeastFloor_m && *value <= 1000;
   };
   const auto sides = parts_of(text, 'x');
   if (sides.size() <= 2 && read(sides.front(), &place->length_m) &&
