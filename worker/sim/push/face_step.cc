@@ -19,42 +19,42 @@ struct Resistance {
 };
 
 // Of the dissipation.  Without `curved` the Hessian is that of a quadratic above it that touches it
-// here: steps with it never overshoot.  What a point adds is found for a block of points at a time,
-// because this is where a worker spends most of its time; the sums go from point to point.
+// here, of which the gradient is this one's, too: steps with it never overshoot.  Sums go over
+// every kBlock-th point, and are put together at the end, because this is where a worker spends
+// most of its time.
 Resistance resistance(const FaceStep::Points& points, const Eigen::Vector3d& V, bool curved) {
   using Block = Eigen::Array<double, FaceStep::kBlock, 1>;
-  Eigen::Array<double, FaceStep::kBlock, 9> added;
-  double g0 = 0, g1 = 0, g2 = 0;
-  double h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0;
-  const double qx = points.q_x, qy = points.q_y, keep = curved ? 1 : 0;
+  Block k0 = Block::Zero(), kx = k0, ky = k0, kr = k0;
+  Block aa = k0, ab = k0, ac = k0, bb = k0, bc = k0, cc = k0;
+  const double qx = points.q_x, qy = points.q_y;
   for (std::size_t i = 0; i < points.x.size(); i += FaceStep::kBlock) {
     const Block x = Block::Map(&points.x[i]), y = Block::Map(&points.y[i]);
     const Block e2 = Block::Map(&points.extent[i]).square();
     const Block ux = V[0] - V[2] * y, uy = V[1] + V[2] * x;
-    const Block rho2 = qx * ux * ux + qy * uy * uy + e2 * V[2] * V[2] + kCreep_m_s * kCreep_m_s;
-    const Block k = Block::Map(&points.impulse[i]) / rho2.sqrt();
-    // J' Q z, and from it the gradient.
     const Block a = qx * ux, b = qy * uy;
+    const Block per_rho2 = 1 / (a * ux + b * uy + e2 * (V[2] * V[2]) + kCreep_m_s * kCreep_m_s);
+    const Block k = Block::Map(&points.impulse[i]) * per_rho2.sqrt();
+    k0 += k;
+    kx += k * x;
+    ky += k * y;
+    kr += k * (qx * y * y + qy * x * x + e2);
+    if (!curved) continue;
     const Block c = x * b - y * a + e2 * V[2];
-    const Block l = keep * k / rho2;
-    added.col(0) = k * a;
-    added.col(1) = k * b;
-    added.col(2) = k * c;
-    added.col(3) = k * qx - l * a * a;
-    added.col(4) = -(l * a * b);
-    added.col(5) = -(k * qx * y + l * a * c);
-    added.col(6) = k * qy - l * b * b;
-    added.col(7) = k * qy * x - l * b * c;
-    added.col(8) = k * (qx * y * y + qy * x * x + e2) - l * c * c;
-    for (Eigen::Index j = 0; j < added.rows(); ++j) {
-      g0 += added(j, 0), g1 += added(j, 1), g2 += added(j, 2);
-      h00 += added(j, 3), h01 += added(j, 4), h02 += added(j, 5);
-      h11 += added(j, 6), h12 += added(j, 7), h22 += added(j, 8);
-    }
+    const Block l = k * per_rho2, la = l * a, lb = l * b;
+    aa += la * a;
+    ab += la * b;
+    ac += la * c;
+    bb += lb * b;
+    bc += lb * c;
+    cc += l * c * c;
   }
+  const double h00 = qx * k0.sum(), h11 = qy * k0.sum(), h02 = -qx * ky.sum(), h12 = qy * kx.sum();
   Resistance r;
-  r.gradient << g0, g1, g2;
-  r.hessian << h00, h01, h02, h01, h11, h12, h02, h12, h22;
+  r.hessian << h00, 0, h02, 0, h11, h12, h02, h12, kr.sum();
+  r.gradient = r.hessian * V;
+  Eigen::Matrix3d bent;
+  bent << aa.sum(), ab.sum(), ac.sum(), ab.sum(), bb.sum(), bc.sum(), ac.sum(), bc.sum(), cc.sum();
+  r.hessian -= bent;
   return r;
 }
 
@@ -199,6 +199,7 @@ Eigen::Vector3d FaceStep::solve_case(const Points& points, const Eigen::Vector3d
       std::max(speed(free), touch == nullptr ? 0.0 : touch->velocity.cwiseAbs().maxCoeff());
   const double close = std::max(kClose * fastest, kLeast_m_s);
   bool curved = true;
+  double last = 0;  // how far the last step went
   Resistance r = resistance(points, V, curved);
   for (int k = 0; k < kMostIterations; ++k) {
     ++iterations_;
@@ -218,7 +219,10 @@ Eigen::Vector3d FaceStep::solve_case(const Points& points, const Eigen::Vector3d
     const Eigen::Vector3d step = inverse * (c.pushes * p - residual);
     impulse_ = p;
     const Eigen::Vector3d to = V + step;
-    if (speed(step) < close) return to;
+    // The next one would be shorter by at least as much as this one is than the last.
+    const double moved = speed(step);
+    if (moved < close || moved * moved < close * last) return to;
+    last = moved;
     // Along the step the work that is left falls from `before` through zero; where it comes out far
     // beyond, back to where it would be zero if it fell evenly, and on with the careful Hessian.
     const double before = -step.dot(H * step);
