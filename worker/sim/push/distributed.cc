@@ -17,9 +17,8 @@ namespace {
 constexpr double kLeastGain = 0.05;     // share that a falling friction keeps
 constexpr double kRepairedDepth = 0.2;  // of a depth, a step
 
-Eigen::Vector2d turned(double angle, const Eigen::Vector2d& d) {
-  const double c = std::cos(angle), s = std::sin(angle);
-  return {c * d[0] - s * d[1], s * d[0] + c * d[1]};
+Eigen::Matrix2d rotation(double angle_rad) {
+  return Eigen::Rotation2Dd(angle_rad).toRotationMatrix();
 }
 
 class DistributedPush final : public SteppedPush {
@@ -33,13 +32,14 @@ class DistributedPush final : public SteppedPush {
  private:
   void reset(const Floor& table, const Eigen::Vector2d& velocity, double spin) override;
   void step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt) override;
-  void place_points(const Pose& X_SM, double dt);
-  bool place_touch(const Pose& X_SM, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
-                   double dt, FingerTouch& touch) const;
+  // R_SB: how the piece is turned there.
+  void place_points(const Pose& X_SM, const Eigen::Matrix2d& R_SB, double dt);
+  bool place_touch(const Pose& X_SM, const Eigen::Matrix2d& R_SB, const Eigen::Vector2d& from,
+                   const Eigen::Vector2d& to, double dt, FingerTouch& touch) const;
 
-  // The centroid's pose when the centre of mass is at X_SM, and back.
+  // The centroid's pose when the centre of mass is at X_SM.
   Pose centroid_pose(const Pose& X_SM) const {
-    const Eigen::Vector2d p = Eigen::Vector2d(X_SM.x, X_SM.y) - turned(X_SM.theta, centre_);
+    const Eigen::Vector2d p = Eigen::Vector2d(X_SM.x, X_SM.y) - rotation(X_SM.theta) * centre_;
     return {p[0], p[1], X_SM.theta};
   }
   MotionSample state(double t_s) const override;
@@ -56,9 +56,10 @@ class DistributedPush final : public SteppedPush {
   FaceStep face_step_;
   FaceStep::Points points_;  // in the grain's axes
   Floor table_;
-  double load_n_ = 0;                               // on the whole face
-  Eigen::Vector2d pull_ = Eigen::Vector2d::Zero();  // of gravity down a slope, m/s^2
-  Pose X_SM_;                                       // centre of mass
+  Eigen::Matrix2d R_GS_ = Eigen::Matrix2d::Identity();  // to the grain's axes
+  double load_n_ = 0;                                   // on the whole face
+  Eigen::Vector2d pull_ = Eigen::Vector2d::Zero();      // of gravity down a slope, m/s^2
+  Pose X_SM_;                                           // centre of mass
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
 };
 
@@ -66,6 +67,7 @@ void DistributedPush::reset(const Floor& table, const Eigen::Vector2d& velocity,
   table_ = table;
   const Eigen::Vector3d gravity = gravity_in_start_frame(table, settings_.gravity_m_s2);
   load_n_ = -gravity[2] * settings_.mass_kg;
+  R_GS_ = rotation(-table.grain_direction_rad);
   pull_ = gravity.head<2>();
   X_SM_ = {centre_[0], centre_[1], 0};
   const Eigen::Vector2d at_centre = velocity + spin * Eigen::Vector2d(-centre_[1], centre_[0]);
@@ -81,21 +83,20 @@ void DistributedPush::reset(const Floor& table, const Eigen::Vector2d& velocity,
   points_.q_y = table.grain_ratio;
 }
 
-void DistributedPush::place_points(const Pose& X_SM, double dt) {
-  const double angle = X_SM.theta - table_.grain_direction_rad;
-  const double c = std::cos(angle), s = std::sin(angle);
+void DistributedPush::place_points(const Pose& X_SM, const Eigen::Matrix2d& R_SB, double dt) {
+  const Eigen::Matrix2d R_GB = R_GS_ * R_SB;
   const double whole = settings_.ground_friction * load_n_ * dt;
-  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(X_SM.theta).toRotationMatrix();
   const bool varies = table_.speed_slope_s_m != 0 ||
                       std::any_of(table_.patches.begin(), table_.patches.end(),
                                   [](const FrictionDisc& disc) { return disc.ratio != 1; });
   for (std::size_t i = 0; i < face_.size(); ++i) {
     const Eigen::Vector2d r = face_[i].p - centre_;
-    points_.x[i] = c * r[0] - s * r[1];
-    points_.y[i] = s * r[0] + c * r[1];
+    const Eigen::Vector2d in_grain = R_GB * r;
+    points_.x[i] = in_grain[0];
+    points_.y[i] = in_grain[1];
     points_.impulse[i] = whole * face_[i].share;
     if (!varies) continue;
-    const Eigen::Vector2d arm = turn * r;
+    const Eigen::Vector2d arm = R_SB * r;
     double gain = 1;
     if (table_.speed_slope_s_m != 0) {
       const double speed =
@@ -107,17 +108,18 @@ void DistributedPush::place_points(const Pose& X_SM, double dt) {
 }
 
 // False: too far to matter in this step.
-bool DistributedPush::place_touch(const Pose& X_SM, const Eigen::Vector2d& from,
-                                  const Eigen::Vector2d& to, double dt, FingerTouch& touch) const {
-  const Pose X_SC = centroid_pose(X_SM);
+bool DistributedPush::place_touch(const Pose& X_SM, const Eigen::Matrix2d& R_SB,
+                                  const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt,
+                                  FingerTouch& touch) const {
   const Eigen::Vector2d finger = (from + to) / 2;
-  const Eigen::Vector2d seen = turned(-X_SC.theta, finger - Eigen::Vector2d(X_SC.x, X_SC.y));
+  const Eigen::Vector2d seen =
+      R_SB.transpose() * (finger - Eigen::Vector2d(X_SM.x, X_SM.y)) + centre_;
   const Touch nearest = nearest_touch(settings_.corners, seen);
   const double gap = nearest.distance_m - settings_.finger_radius_m - settings_.contact_margin_m;
   const double moved = (std::hypot(velocity_[0], velocity_[1]) * dt + (to - from).norm());
   if (gap > kNear_m + moved) return false;
-  const Eigen::Vector2d inward = turned(X_SC.theta, -nearest.normal);
-  const Eigen::Vector2d arm = turned(X_SC.theta, nearest.point - centre_);
+  const Eigen::Vector2d inward = R_SB * -nearest.normal;
+  const Eigen::Vector2d arm = R_SB * (nearest.point - centre_);
   touch.velocity = (to - from) / dt;
   const Eigen::Vector2d material =
       velocity_.head<2>() + velocity_[2] * Eigen::Vector2d(-arm[1], arm[0]);
@@ -131,26 +133,25 @@ bool DistributedPush::place_touch(const Pose& X_SM, const Eigen::Vector2d& from,
   }
   touch.compliance_m_n = settings_.finger_compliance_m_n;
   touch.friction = settings_.finger_friction;
-  const double grain = table_.grain_direction_rad;
-  touch.inward = turned(-grain, inward);
-  touch.arm = turned(-grain, arm);
-  touch.velocity = turned(-grain, touch.velocity);
+  touch.inward = R_GS_ * inward;
+  touch.arm = R_GS_ * arm;
+  touch.velocity = R_GS_ * touch.velocity;
   return true;
 }
 
 void DistributedPush::step(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt) {
   const Pose middle{X_SM_.x + dt / 2 * velocity_[0], X_SM_.y + dt / 2 * velocity_[1],
                     X_SM_.theta + dt / 2 * velocity_[2]};
-  place_points(middle, dt);
+  const Eigen::Matrix2d R_SB = rotation(middle.theta);
+  place_points(middle, R_SB, dt);
   FingerTouch touch;
-  const bool near = place_touch(middle, from, to, dt, touch);
-  const double grain = table_.grain_direction_rad;
-  const Eigen::Vector2d now = turned(-grain, velocity_.head<2>());
-  const Eigen::Vector2d free = now + dt * turned(-grain, pull_);
+  const bool near = place_touch(middle, R_SB, from, to, dt, touch);
+  const Eigen::Vector2d now = R_GS_ * velocity_.head<2>();
+  const Eigen::Vector2d free = now + dt * (R_GS_ * pull_);
   const Eigen::Vector3d after =
       face_step_.solve(points_, {free[0], free[1], velocity_[2]}, {now[0], now[1], velocity_[2]},
                        near ? &touch : nullptr, dt);
-  velocity_ << turned(grain, after.head<2>()), after[2];
+  velocity_ << R_GS_.transpose() * after.head<2>(), after[2];
   X_SM_.x += dt * velocity_[0];
   X_SM_.y += dt * velocity_[1];
   X_SM_.theta += dt * velocity_[2];
