@@ -207,7 +207,7 @@ std::optional<Candidate> best_within_tolerances(const WindowFitter& fitter, cons
     values = search.fit.values;
     const std::vector<FitRow> rows = with_freed(search.fit.rows, hypothesis, &values);
     c.fit = fitter.fit(rows, {}, values);
-    c.may_be_named = shows_its_size(fitter, work, search, i, c.fit);
+    c.may_be_named = shows_its_size(fitter, work, search, i, c.fit, c.held_out);
     if (c.may_be_named) best = std::move(c);
   }
   return best;
@@ -234,11 +234,13 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   while (!tried.empty() && (tried.back().gain() < worth || tried.size() > kLeaders)) {
     tried.pop_back();
   }
-  // What a well-kept file is off by needs no name; what changed is compared with what is kept.
+  // What a well-kept file is off by needs no name, beside the other values as they are or as they
+  // move; what changed is compared with what is kept.
   const auto shown = [&](const Candidate& c) {
     const GroundHypothesis& h = search->catalogue[c.offer.hypothesis];
-    return (search->reference || h.describe || tolerances_off(h, c.fit) > 1) &&
-           shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit);
+    const bool off = tolerances_off(h, c.fit) > 1 && tolerances_off(h, c.held_out) > 1;
+    return (search->reference || h.describe || off) &&
+           shows_its_size(fitter, work, *search, c.offer.hypothesis, c.fit, c.held_out);
   };
   const bool further = !search->steps.empty();
   for (Candidate& c : tried) {

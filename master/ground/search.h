@@ -198,18 +198,31 @@ std::vector<FitRow> tuned_rows(const std::vector<FitRow>& rows);
 // Which names stand beside one another (stands.cc).
 
 // Whether the interval of what says how much of it there is, its first parameter, excludes none, or
-// what is kept: what a few windows at a border gain may be theirs alone.
+// what is kept: what a few windows at a border gain may be theirs alone.  `alone`: the other values
+// as the file has them, where what shows has the same sign.
 bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
-                    std::size_t index, const WindowFit& fit);
+                    std::size_t index, const WindowFit& fit, const WindowFit& alone);
 
 // How far the farthest of a hypothesis' values is off, in tolerances of a well-kept file.
 // REQUIRES: the fit has them.
 double tolerances_off(const GroundHypothesis& hypothesis, const WindowFit& fit);
 
-// The file with these hypotheses put right, predicting what was not fitted; fits begin where `fit`
-// ended.
+// The file with these hypotheses put right (its values), predicting what was not fitted; fits begin
+// where `fit` ended.
 WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,
                         const std::vector<std::size_t>& hypotheses, const WindowFit& fit);
+
+// Of the search's fit, row by row.
+struct StatedValues {
+  std::vector<bool> in_file;  // whether the robot's file gets it
+  Eigen::VectorXd values;
+  Eigen::MatrixX2d intervals;  // 90 %
+};
+
+// The file gets some values and keeps the others, so those are what fits best beside these; how far
+// they would move with them is in their intervals.  `unseen`: rows that no window shows.
+StatedValues stated_values(const WindowFitter& fitter, const GroundSearch& search,
+                           const std::vector<std::string>& unseen, std::uint64_t seed);
 
 // Names that would not be given beside all others lose them, unless none would be left.
 void drop_again(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,

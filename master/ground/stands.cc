@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/base/ranges.h"
+#include "common/math/algebra.h"
 #include "master/ground/report/ground_text.h"
 #include "master/ground/search.h"
 #include "master/infer/settings.h"
@@ -110,7 +111,7 @@ double tolerances_off(const GroundHypothesis& hypothesis, const WindowFit& fit) 
 }
 
 bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const GroundSearch& search,
-                    std::size_t index, const WindowFit& fit) {
+                    std::size_t index, const WindowFit& fit, const WindowFit& alone) {
   const GroundHypothesis& hypothesis = search.catalogue[index];
   const double kept = search.reference ? hypothesis.kept : 0;
   const auto shows = [&](const Estimate& size) { return size.lo > kept || size.hi < -kept; };
@@ -122,7 +123,9 @@ bool shows_its_size(const WindowFitter& fitter, const GroundWork& work, const Gr
   const Eigen::MatrixX2d intervals = fitter.intervals(fit, work.seed);
   return std::ranges::any_of(hypothesis.freed, [&](const KinematicRow& row) {
     const Eigen::Index i = row_index(fit.rows, row.name);
-    return shows({row.key, 0, intervals(i, 0) - row.nominal, intervals(i, 1) - row.nominal, ""});
+    const double value = alone.values[row_index(alone.rows, row.name)];
+    return shows({row.key, 0, std::min(intervals(i, 0), value) - row.nominal,
+                  std::max(intervals(i, 1), value) - row.nominal, ""});
   });
 }
 
@@ -134,7 +137,39 @@ WindowFit held_out_with(const WindowFitter& fitter, const GroundSearch& search,
     rows = with_freed(std::move(rows), search.catalogue[h], &start);
   }
   take_values(fit, rows, &start);
-  return fit_held_out(fitter, rows, start);
+  return fit_held_out(fitter, rows, fitter.fit(rows, {}, start).values);
+}
+
+StatedValues stated_values(const WindowFitter& fitter, const GroundSearch& search,
+                           const std::vector<std::string>& unseen, std::uint64_t seed) {
+  const WindowFit& fit = search.fit;
+  StatedValues all{{}, fit.values, fitter.intervals(fit, seed)};
+  std::vector<FitRow> rows;
+  std::vector<Eigen::Index> places;
+  for (Eigen::Index j = 0; j < fit.values.size(); ++j) {
+    const FitRow& row = fit.rows[static_cast<std::size_t>(j)];
+    const double had = row.row.nominal, off = fit.values[j] - had;
+    // What fits move without its name predicts as well, but costs as many nats as a name.
+    const bool known = search.unexplained < kUnexplained && !contains(unseen, row.row.name) &&
+                       std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
+                       (all.intervals(j, 0) > had || all.intervals(j, 1) < had);
+    // Against a reference every value is the two logs' own.
+    all.in_file.push_back(row.free || known || search.reference.has_value());
+    if (!all.in_file.back() && !row.row.tuned) continue;
+    rows.push_back(row);
+    places.push_back(j);
+  }
+  if (search.reference || search.windows.simulated) return all;
+  const WindowFit alone =
+      fitter.fit(rows, {}, vector_of(places, [&](Eigen::Index j) { return fit.values[j]; }));
+  const Eigen::MatrixX2d intervals = fitter.intervals(alone, seed);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Eigen::Index j = places[k], at = static_cast<Eigen::Index>(k);
+    all.values[j] = alone.values[at];
+    all.intervals(j, 0) = std::min(all.intervals(j, 0), intervals(at, 0));
+    all.intervals(j, 1) = std::max(all.intervals(j, 1), intervals(at, 1));
+  }
+  return all;
 }
 
 void drop_again(const WindowFitter& fitter, const GroundWork& work, const GroundNames& unnamed,
@@ -145,8 +180,8 @@ void drop_again(const WindowFitter& fitter, const GroundWork& work, const Ground
     // What is left alone once another went may gain nothing that is sure.
     return may_be_named(step.held_out) &&
            (others.steps.empty() ||
-            (may_be_named(gain) &&
-             shows_its_size(fitter, work, *search, step.chosen, search->fit)));
+            (may_be_named(gain) && shows_its_size(fitter, work, *search, step.chosen, search->fit,
+                                                  search->chain.back())));
   };
   drop_where_not(fitter, work, unnamed, search, stands);
 }

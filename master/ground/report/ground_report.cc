@@ -30,8 +30,8 @@ class GroundReport {
         search_(search),
         options_(options),
         fitter_(robot, search.windows, search.reference, options.memo),
-        intervals_(fitter_.intervals(search.fit, options.seed)),
-        unseen_rows_(rows_not_shown(fitter_, search, options.seed)) {}
+        unseen_rows_(rows_not_shown(fitter_, search, options.seed)),
+        stated_(stated_values(fitter_, search, unseen_rows_, options.seed)) {}
 
   GroundDiagnosis write() {
     faults();
@@ -87,7 +87,7 @@ class GroundReport {
     for (const KinematicRow& row : h.freed) {
       if (const Eigen::Index j = row_index(search_.fit.rows, row.name); j >= 0) {
         effect.parameters.push_back(
-            estimate_of(row, search_.fit.values[j], intervals_(j, 0), intervals_(j, 1)));
+            estimate_of(row, stated_.values[j], stated_.intervals(j, 0), stated_.intervals(j, 1)));
       }
     }
     const double floor = mean(search_.best.nats);
@@ -355,19 +355,14 @@ class GroundReport {
   std::vector<ReportedValue> reported_values() const {
     std::vector<ReportedValue> values;
     for (std::size_t j = 0; j < search_.fit.rows.size(); ++j) {
-      const FitRow& row = search_.fit.rows[j];
-      const double had = row.row.nominal, off = search_.fit.values[j] - had;
-      const Interval interval = {intervals_(j, 0), intervals_(j, 1)};
-      // What fits move without its name predicts as well, but costs as many nats as a name.
-      const bool known = search_.unexplained < kUnexplained &&
-                         !contains(unseen_rows_, row.row.name) &&
-                         std::pow(off / row.row.tolerance, 2) / 2 > kLeastGroundGain &&
-                         (interval.lower > had || interval.upper < had);
-      // Against a reference every value is the two logs' own.
-      values.push_back({row.row.name, value_in_file(robot_, row.row.name), search_.fit.values[j],
-                        interval, row.free || known || search_.reference.has_value()});
+      const KinematicRow& row = search_.fit.rows[j].row;
+      values.push_back({row.name,
+                        value_in_file(robot_, row.name),
+                        stated_.values[j],
+                        {stated_.intervals(j, 0), stated_.intervals(j, 1)},
+                        stated_.in_file[j]});
       for (const SensorValue& v : search_.sensor) {
-        if (v.row.name != row.row.name) continue;
+        if (v.row.name != row.name) continue;
         values.back() = {v.row.name, v.had, v.value, v.interval, v.shown};
       }
     }
@@ -381,8 +376,8 @@ class GroundReport {
   const GroundSearch& search_;
   const GroundDiagnoseOptions& options_;
   WindowFitter fitter_;
-  Eigen::MatrixX2d intervals_;
   std::vector<std::string> unseen_rows_;
+  StatedValues stated_;
   std::string unseen_;  // which values no window shows; empty: none
   bool has_far_runs_ = false;
   GroundDiagnosis result_;
