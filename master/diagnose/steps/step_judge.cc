@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
 #include "common/effects/catalogue.h"
+#include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/correction/fit.h"
@@ -99,6 +102,44 @@ bool is_far_view(const DiagnosisRequest& of, const Parameter& row, double value)
   return std::abs(value - middle) > kFarView * box.longer_side();
 }
 
+// Where trials of one command scatter more than those of others, the noise of all hides what
+// happens to that command alone.  By ranks (Kruskal and Wallis 1952), so that a few that are far
+// off are no scatter; nothing where a noise of its own for each would gain no more than is
+// tolerated.
+std::optional<Leftover> scatter_of_commands(const Evidence& evidence, const Regression& explained) {
+  constexpr double kMiddle = 2.366;  // of a chi-squared of three
+  const Study& study = evidence.study;
+  const Eigen::VectorXd z = studentised(explained, 0.2);
+  std::map<std::size_t, std::vector<double>> squares;  // of each command's trials
+  std::vector<double> all;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const double square = z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm();
+    if (square == 0) continue;  // ignored
+    squares[study.trials[i].command].push_back(square);
+    all.push_back(square);
+  }
+  std::ranges::sort(all);
+  const auto n = static_cast<double>(all.size());
+  double between = 0, mean_square = 0, mean_log = 0;
+  for (const auto& [command, of] : squares) {
+    const auto count = static_cast<double>(of.size());
+    double ranks = 0;
+    for (const double square : of) ranks += 1 + std::ranges::lower_bound(all, square) - all.begin();
+    between += count * std::pow(ranks / count - (n + 1) / 2, 2);
+    const double scale = median(of) / kMiddle;
+    mean_square += count / n * scale;
+    mean_log += count / n * std::log(scale);
+  }
+  if (squares.size() < 2) return std::nullopt;
+  const double gain = 1.5 * (std::log(mean_square) - mean_log);
+  const double p =
+      chi_squared_above(static_cast<double>(squares.size()) - 1, 12 / (n * (n + 1)) * between);
+  if (gain < kToleratedGap) return std::nullopt;
+  const bool pieces = contains(evidence.blocks, "piece", &CovariateBlock::name);
+  return Leftover{pieces ? "piece, by scatter" : "command, by scatter",
+                  std::log10(std::max(p, 1e-300)), n * gain};
+}
+
 // Of what a perfect prediction would score, nats a trial.
 double gap_left(const Refit& refit) { return refit.floor - mean(scores_with_all(refit)); }
 
@@ -108,6 +149,11 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
   const Evidence& evidence = *explanation.evidence;
   const Study& study = evidence.study;
   std::vector<Leftover> left = leftovers(explained, evidence.blocks);
+  if (explanation.spreads.empty()) {
+    if (auto scatter = scatter_of_commands(evidence, explained))
+      left.push_back(*std::move(scatter));
+    std::ranges::stable_sort(left, {}, &Leftover::log10_p);
+  }
   if (study.misfit_columns == 0) return left;
   // What repeats of a trial have in common was kept from the effects as another physics' misfit,
   // but a simulation that misses more than a sound one may is not whole.

@@ -312,9 +312,16 @@ std::vector<std::size_t> against_their_fingers(const Problem& problem) {
     if (t.tip.empty()) return 0.0;
     const Piece& piece = problem.piece(t.command);
     const Eigen::Vector2d tip(t.tip.back().x, t.tip.back().y), middle = centroid(piece);
-    const double moved = (transform(t.X_WE, middle) - transform(t.X_WS, middle)).norm();
-    const double inside = finger_m - outside(tip, piece, t.X_WE);
-    return std::max({0.0, inside, moved - way_of(t)}) / reach_of(piece);
+    const Eigen::Vector2d start = transform(t.X_WS, middle);
+    const double moved = (transform(t.X_WE, middle) - start).norm();
+    const double inside = finger_m - outside(tip, piece, t.X_WE), reach = reach_of(piece);
+    const auto off_middle = [&](const TipSample& at) {
+      return std::hypot(at.x - start.x(), at.y - start.y());
+    };
+    // A lens or a late clock leaves a finger nearer than that.
+    const double nearest = std::ranges::min(mapped(t.tip, off_middle)) - finger_m - 2 * reach;
+    const double untouched = std::min(corner_distance(piece, t.X_WS, t.X_WE), nearest);
+    return std::max({0.0, inside, moved - way_of(t), untouched}) / reach;
   });
   const double most = off.empty() ? 0 : std::max(kMeets, kTimesUsual * quantile(off, kTrueShare));
   return filtered(indices(off.size()), [&](std::size_t i) { return off[i] > most; });
