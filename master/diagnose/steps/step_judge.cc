@@ -104,8 +104,8 @@ bool is_far_view(const DiagnosisRequest& of, const Parameter& row, double value)
 
 // Where trials of one command scatter more than those of others, the noise of all hides what
 // happens to that command alone.  By ranks (Kruskal and Wallis 1952), so that a few that are far
-// off are no scatter; nothing where a noise of its own for each would gain no more than is
-// tolerated.
+// off are no scatter; nothing where all are within the noise, or a noise of its own for each would
+// gain no more than is tolerated.
 std::optional<Leftover> scatter_of_commands(const Evidence& evidence, const Regression& explained) {
   constexpr double kMiddle = 2.366;  // of a chi-squared of three
   const Study& study = evidence.study;
@@ -120,7 +120,7 @@ std::optional<Leftover> scatter_of_commands(const Evidence& evidence, const Regr
   }
   std::ranges::sort(all);
   const auto n = static_cast<double>(all.size());
-  double between = 0, mean_square = 0, mean_log = 0;
+  double between = 0, mean_square = 0, mean_log = 0, widest = 0;
   for (const auto& [command, of] : squares) {
     const auto count = static_cast<double>(of.size());
     double ranks = 0;
@@ -129,12 +129,13 @@ std::optional<Leftover> scatter_of_commands(const Evidence& evidence, const Regr
     const double scale = median(of) / kMiddle;
     mean_square += count / n * scale;
     mean_log += count / n * std::log(scale);
+    widest = std::max(widest, scale);
   }
   if (squares.size() < 2) return std::nullopt;
   const double gain = 1.5 * (std::log(mean_square) - mean_log);
   const double p =
       chi_squared_above(static_cast<double>(squares.size()) - 1, 12 / (n * (n + 1)) * between);
-  if (gain < kToleratedGap) return std::nullopt;
+  if (gain < kToleratedGap || widest < 1) return std::nullopt;
   const bool pieces = contains(evidence.blocks, "piece", &CovariateBlock::name);
   return Leftover{pieces ? "piece, by scatter" : "command, by scatter",
                   std::log10(std::max(p, 1e-300)), n * gain};
