@@ -3,6 +3,7 @@
 
 #include "common/base/ranges.h"
 #include "common/base/text.h"
+#include "common/random/stream.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/diagnose.h"
@@ -192,6 +193,25 @@ TEST(Diagnose, ABaseOnItsBoundsThatExplainsTheLogLacksNothing) {
   const auto result = diagnose(farm, problem, {});
   ASSERT_TRUE(result.ok()) << result.error().message;
   EXPECT_EQ(result->diagnosis.verdict, Verdict::kNone) << result->diagnosis.headline;
+}
+
+// What happens to one command alone is no noise of all.
+TEST(Diagnose, ACommandThatScattersByFarMoreThanOthersLacksSomething) {
+  for (const double times : {1.0, 4.0}) {
+    Problem problem = kinematic_log(240);
+    Stream stream({3, Purpose::kTest, 0, 0, 0});
+    for (Trial& t : problem.log.trials) {
+      const double m = 0.004 * (t.command == problem.commands[0].name ? times : 1);
+      const Pose moved{m * stream.normal(), m * stream.normal(), 2 * m * stream.normal()};
+      t.X_WE = t.X_WE * moved;
+    }
+    KinematicFarm farm;
+    const auto result = diagnose(farm, problem, {});
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    const Diagnosis& d = result->diagnosis;
+    EXPECT_EQ(d.verdict, times == 1 ? Verdict::kNone : Verdict::kUnknown) << d.headline;
+    EXPECT_EQ(contains(d.checks, "command, by scatter", &Leftover::covariate), times != 1);
+  }
 }
 
 TEST(Diagnose, ReportsTheSameWhoeverWatches) {

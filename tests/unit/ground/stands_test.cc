@@ -94,6 +94,24 @@ RunLog with_noise(RunLog log, double m, double rad) {
   return log;
 }
 
+// A lag that moves within its tolerance is not written, so the delay beside it is for a robot that
+// has none: with this file nothing is late any more.
+TEST(DiagnoseGround, TheFileGetsWhatIsRightBesideItsOtherValues) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const RunLog log =
+      with_noise(driven(robot, off_by({"delay", "lag"}, {0.15, 0.125})), 0.002, 0.004);
+  const auto found = diagnose_ground(robot, log, {});
+  ASSERT_TRUE(found) << found.error().message;
+  ASSERT_EQ(found->diagnosis.effects.size(), 1u) << found->diagnosis.headline;
+  const NamedEffect& delay = found->diagnosis.effects.front();
+  EXPECT_EQ(delay.name, "command_delay");
+  EXPECT_LT(delay.parameters[0].lo, 0.15);  // with the lag
+  EXPECT_NEAR(delay.parameters[0].value, 0.175, 0.01);
+  EXPECT_EQ(found->corrected.motors.lag_s, robot.motors.lag_s);
+  const Diagnosis again = diagnosed(found->corrected, log);
+  EXPECT_TRUE(again.effects.empty()) << again.headline;
+}
+
 // What closes less than is tolerated, and is little, needs no name, however sure a long log is.
 TEST(DiagnoseGround, NamesNothingWhileTheGapIsTolerated) {
   const GroundRobot robot = robot_of(kDifferential);

@@ -240,6 +240,17 @@ TEST(PushChecks, EndsThatTheirFingersExcludeAreFalse) {
   EXPECT_EQ(omitted, (std::vector<std::size_t>{4, 9}));
 }
 
+// Two rows that have each other's poses: neither finger comes near, and both pieces move.
+TEST(PushChecks, PiecesThatMoveFarFromTheirFingersAreFalse) {
+  Problem problem = pushed();
+  for (const std::size_t i : {4, 9}) {
+    for (Pose* X : {&problem.log.trials[i].X_WS, &problem.log.trials[i].X_WE}) X->y += 1;
+  }
+  EXPECT_EQ(against_their_fingers(problem), (std::vector<std::size_t>{4, 9}));
+  problem.log.trials[4].X_WE = problem.log.trials[4].X_WS;  // a miss is none
+  EXPECT_EQ(against_their_fingers(problem), (std::vector<std::size_t>{9}));
+}
+
 TEST(PushChecks, NoteAnotherPiece) {
   Problem problem = pushed();
   for (Eigen::Vector2d& corner : problem.pieces[0].corners) corner *= 1.5;
