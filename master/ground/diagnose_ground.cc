@@ -202,8 +202,8 @@ Status add_motors(const RunLog& log, GroundDiagnoseOptions options, GroundDiagno
   }
   GroundQuestion question = ask_what_is_wrong(found->corrected, log);
   std::erase_if(question.catalogue, [&](const GroundHypothesis& h) {
-    static const std::vector<std::string> kMotors = {"command_delay", "motor_lag",
-                                                     "acceleration_limit", "motor_deadband"};
+    static const std::vector<std::string> kMotors = {
+        "command_delay", "motor_lag", "acceleration_limit", "motor_deadband", "battery_sag"};
     return h.put_right || !contains(kMotors, h.name) || contains(options.excluded, h.name);
   });
   options.excluded.clear();
@@ -247,7 +247,12 @@ Result<GroundDiagnosis> diagnose_measured(const GroundRobot& robot, const RunLog
         "explains the motions far better.",
         driven.rows_late_s));
   }
-  if (reference != nullptr) return found;
+  if (reference != nullptr) {
+    found.diagnosis.cautions.push_back(
+        "How late and slowly the wheels follow commands was not compared: diagnose each log by "
+        "itself for that.");
+    return found;
+  }
   const Status added = add_motors(log, options, &found);
   if (!added && options.stopped && options.stopped()) return added.error();
   if (!added) {

@@ -343,8 +343,9 @@ class GroundReport {
     d_.headline = d_.effects.front().text;
     if (changes && d_.effects.size() == 1 && !d_.headline.empty()) {
       d_.headline.back() = ';';
-      d_.headline +=
-          d_.verdict == Verdict::kEffect ? " nothing else." : " it does not explain all.";
+      d_.headline += d_.verdict != Verdict::kEffect ? " it does not explain all."
+                     : search_.loop                 ? " nothing else behind the wheels."
+                                                    : " nothing else.";
     }
     if (d_.effects.size() > 1) {
       d_.headline +=

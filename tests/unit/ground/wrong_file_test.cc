@@ -291,6 +291,24 @@ TEST(WrongFile, WheelRowsOfAnyStampShowWhatLiesBeforeTheWheels) {
   }
 }
 
+// A battery acts before the wheels: measured speeds follow it, and commands do not.
+TEST(WrongFile, ABatteryThatSagsShowsBesideMeasuredWheels) {
+  const GroundRobot robot = robot_of(kDifferential);
+  constexpr double kSag = 0.1;
+  RunLog log = with_wheel_rows(driven(robot, off_by({"sag"}, {kSag})), robot, 0);
+  const double began_s = log.runs.front().commands.front().t_s;
+  for (LoggedRun& run : log.runs) {
+    for (CommandRow& row : run.wheel_speeds) {
+      for (double& value : row.values) value *= 1 - kSag * (row.t_s - began_s) / 60;
+    }
+  }
+  const GroundDiagnosis found = checked(robot, log, "sag");
+  ASSERT_TRUE(names(found, "battery_sag")) << found.diagnosis.headline;
+  EXPECT_NEAR(found.diagnosis.effects.back().parameters[0].value, kSag, 0.01);
+  const GroundDiagnosis none = checked(robot, with_wheel_rows(driven(robot, {}), robot, 0), "none");
+  EXPECT_EQ(none.diagnosis.verdict, Verdict::kNone) << none.diagnosis.headline;
+}
+
 // Between what a caution of clocks reached and ten times the others' misses nothing was reported.
 TEST(WrongFile, ARunThatIsHalfASecondLateIsNotNothing) {
   const GroundRobot robot = robot_of(kDifferential);
