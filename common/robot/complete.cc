@@ -259,10 +259,24 @@ class Completion {
     return {};
   }
 
-  // Of the driven axle: stated, or assumed from the wheelbase, which is.
+  // How far the wheels of the unsteered axle stand apart, by their places; 0: no two are placed.
+  double placed_track() const {
+    double left = 0, right = 0;
+    for (const RobotWheel& w : r_.wheels) {
+      if (w.steered || !w.x_m || !w.y_m || w.kind == WheelKind::kCaster) continue;
+      left = std::max(left, *w.y_m);
+      right = std::min(right, *w.y_m);
+    }
+    return left > 0 && right < 0 ? left - right : 0;
+  }
+
+  // Of the unsteered axle: stated, or assumed from the wheelbase, which is.
   double stated_track() {
     auto& k = r_.controller;
     if (!k.traction_track_width_m) k.traction_track_width_m = k.wheel_separation_m;
+    if (const double placed = placed_track(); placed > 0 && !k.traction_track_width_m) {
+      k.traction_track_width_m = placed;
+    }
     if (!k.traction_track_width_m) {
       k.traction_track_width_m = kTrackPerBase * *k.wheelbase_m;
       assume("a track of " + digits4(*k.traction_track_width_m) + " m");
@@ -288,7 +302,7 @@ class Completion {
       assume("the front wheel drives (where the others do, give all three in [wheels.NAME])");
     }
     place(ensure("front", true, /*steered=*/true), *k.wheelbase_m, 0);
-    pair("rear_", 0, track / 2, /*driven=*/false);
+    if (placed_track() == 0) pair("rear_", 0, track / 2, /*driven=*/false);
     return {};
   }
 

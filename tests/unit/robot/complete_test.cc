@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "common/robot/robot.h"
 
@@ -53,6 +54,24 @@ TEST(CompleteRobot, SteersNoWheelBehindTheOthers) {
   ASSERT_FALSE(completed.ok());
   EXPECT_NE(completed.error().message.find("turn the frame round"), std::string::npos)
       << completed.error().message;
+}
+
+// An axle whose wheels stand somewhere needs no other one, whatever they are called.
+TEST(CompleteRobot, TakesATricyclesAxleFromItsWheels) {
+  GroundRobot robot;
+  robot.drive = DriveKind::kTricycle;
+  robot.controller.wheelbase_m = 0.62;
+  for (const auto& [name, x, y] : {std::tuple("front", 0.62, 0.0), std::tuple("left", 0.0, 0.22),
+                                   std::tuple("right", 0.0, -0.22)}) {
+    RobotWheel& wheel = robot.wheels.emplace_back();
+    wheel.name = name;
+    wheel.x_m = x, wheel.y_m = y, wheel.radius_m = 0.08;
+    wheel.driven = wheel.steered = x > 0;
+  }
+  ASSERT_TRUE(complete_robot(&robot).ok());
+  EXPECT_EQ(robot.wheels.size(), 3u);
+  EXPECT_EQ(robot.controller.traction_track_width_m, 0.44);
+  for (const std::string& note : robot.notes) EXPECT_EQ(note.find("track"), note.npos) << note;
 }
 
 TEST(CompleteRobot, CrossesTheRollersOfAMecanumDrive) {
